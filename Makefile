@@ -1,0 +1,78 @@
+# Each target does its own set-up. Needed on the machine: Python 3.11 or newer, make, a C compiler, Rust (cargo).
+# `make` alone lists the targets.
+
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+
+# The environment made here, whichever other one is active.
+export VIRTUAL_ENV := $(CURDIR)/$(VENV)
+export PYO3_PYTHON := $(CURDIR)/$(BIN)/python
+unexport CONDA_PREFIX PYTHONHOME PYTHONPATH
+export PIP_DISABLE_PIP_VERSION_CHECK := 1
+
+# On CI the locked crates and no others.
+LOCKED := $(if $(CI),--locked)
+
+DEPS := $(VENV)/.deps
+BUILT := $(VENV)/.built
+# Whatever the compiled module is made from; Python sources are used in place and need no build.
+RUST := Cargo.toml $(wildcard Cargo.lock) $(shell find crates -name target -prune -o -type f \( -name '*.rs' -o -name 'Cargo.toml' \) -print 2>/dev/null)
+
+.DEFAULT_GOAL := help
+.DELETE_ON_ERROR:
+.PHONY: help demo test test-all test-rust lint bench docs wheel lock clean
+
+help: ## list the targets
+	@awk 'BEGIN { FS = ":.*## " } /^[a-z-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' Makefile
+
+demo: $(BUILT) ## analyse the published manipulator: tables and figures into demo/
+	$(BIN)/polypod demo -o demo
+
+test: test-rust $(BUILT) ## Rust and Python tests, without the slow ones
+	$(BIN)/python -m pytest
+
+test-all: $(BUILT) ## all tests, the slow ones too
+	cargo test $(LOCKED) -p polypod-core -- --include-ignored
+	$(BIN)/python -m pytest -m "" -n auto
+
+test-rust:
+	cargo test $(LOCKED) -p polypod-core
+
+lint: $(BUILT) ## formatting, style and types of both languages
+	$(BIN)/ruff check
+	$(BIN)/ruff format --check
+	$(BIN)/mypy
+	$(BIN)/python -m mypy.stubtest --mypy-config-file pyproject.toml polypod._core
+	cargo fmt --all --check
+	cargo clippy $(LOCKED) --workspace --all-targets -- -D warnings
+
+bench: $(BUILT) ## measure the speed from Rust and from Python
+	cargo bench $(LOCKED) -p polypod-core
+	@for file in benchmarks/*.py; do echo "$(BIN)/python $$file"; $(BIN)/python "$$file" || exit 1; done
+
+docs: $(BUILT) ## build the site into site/
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
+
+wheel: $(DEPS) ## build a wheel for this machine into dist/
+	$(BIN)/maturin build --release $(LOCKED) --out dist
+
+lock: $(DEPS) ## renew requirements.lock and Cargo.lock
+	$(BIN)/uv pip compile --quiet --upgrade --universal --python-version 3.11 --generate-hashes --no-header \
+		--extra dev --output-file requirements.lock pyproject.toml
+	cargo update
+
+clean: ## remove whatever these targets made
+	rm -rf $(VENV) build demo dist site target .hypothesis .mypy_cache .pytest_cache .ruff_cache
+	rm -f python/polypod/_core*.so python/polypod/_core*.pyd
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +
+
+$(DEPS): requirements.lock
+	@$(PYTHON) -c 'import sys; sys.exit(None if sys.version_info >= (3, 11) else "Polypod needs Python 3.11 or newer.")'
+	$(PYTHON) -m venv --clear $(VENV)
+	$(BIN)/python -m pip install --quiet --no-compile --require-hashes --requirement requirements.lock
+	@touch $@
+
+$(BUILT): $(DEPS) $(RUST) pyproject.toml
+	$(BIN)/maturin develop --uv --release $(LOCKED)
+	@touch $@

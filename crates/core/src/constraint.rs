@@ -1,0 +1,234 @@
+//! The scalar constraints that legs put on the platform: four kinds, each with its value, its wrench (the row of
+//! the Jacobian) and its Hessian \[T9\]-\[T12\].
+
+use crate::mechanism::{Leg, Side, Turning};
+use crate::real::Real;
+use crate::spatial::{Pose, Vec3, Wrench};
+use crate::spec::JointKind;
+
+/// A 6×6 block of the Hessian, rows and columns as (v, ω).
+pub type Hessian<T> = [[T; 6]; 6];
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ConstraintKind {
+    /// U below, U above: leg and both axes lie in one plane, `(l × r)·L = 0` \[Eq. 4\].
+    A,
+    /// R or F below: the leg is square to an axis of the base, `r·a_B = 0`.
+    B,
+    /// R or F above: the leg is square to an axis of the platform, `r·a_P = 0`.
+    C,
+    /// R or F against U, R or F: two axes are square, `a_B·a_P = 0`.
+    D,
+}
+
+#[derive(Clone, Copy, Debug)]
+pub struct Constraint {
+    pub kind: ConstraintKind,
+    pub leg: usize,
+    /// B in base axes and m in platform axes.
+    pub base_point: Vec3<f64>,
+    pub platform_point: Vec3<f64>,
+    /// Unit axes: L or a_B in base axes, l or a_P in platform axes; zero where the kind has none.
+    pub base_axis: Vec3<f64>,
+    pub platform_axis: Vec3<f64>,
+}
+
+/// The constraints of one leg, from what its two joints say about its direction δ and its normal n.
+#[must_use]
+pub fn of_leg(index: usize, leg: &Leg) -> Vec<Constraint> {
+    let make = |kind, base_axis, platform_axis| Constraint {
+        kind,
+        leg: index,
+        base_point: leg.base.point,
+        platform_point: leg.platform.point,
+        base_axis,
+        platform_axis,
+    };
+    let none = Vec3::zero();
+    // A fixed joint holds δ as well: the leg is square to two axes of the body.
+    let square =
+        |kind: JointKind, axis: Option<Vec3<f64>>, normal: Option<Vec3<f64>>| match (kind, axis, normal) {
+            (JointKind::Revolute, Some(a), _) => vec![a],
+            (JointKind::Fixed, Some(d), Some(n)) => vec![n, n.cross(d)],
+            _ => vec![],
+        };
+    let below = square(leg.base.kind, leg.base.axis, leg.base.normal);
+    let above = square(leg.platform.kind, leg.platform.axis, leg.platform.normal);
+    let b = below.iter().map(|&a| make(ConstraintKind::B, a, none));
+    let c = above.iter().map(|&a| make(ConstraintKind::C, none, a));
+    let d = |base_axis, platform_axis| make(ConstraintKind::D, base_axis, platform_axis);
+    let (base, platform) = (
+        normal_of(leg.base.kind, &leg.base),
+        normal_of(leg.platform.kind, &leg.platform),
+    );
+    match (base, platform) {
+        (None, _) | (_, None) => b.chain(c).collect(),
+        (Some(Normal::Across(u)), Some(Normal::Across(w))) => vec![make(ConstraintKind::A, u, w)],
+        (Some(Normal::Along(a)), Some(Normal::Across(w))) => b.chain([d(a, w)]).collect(),
+        (Some(Normal::Across(u)), Some(Normal::Along(a))) => c.chain([d(u, a)]).collect(),
+        (Some(Normal::Along(n)), Some(Normal::Along(m))) => {
+            // n and m are one line: n is square to the two directions that are square to m. With δ held on both
+            // sides one more relation keeps the platform from turning about n.
+            let two = |axis: Vec3<f64>, direction: Option<Vec3<f64>>| {
+                let first = direction.unwrap_or_else(|| axis.perpendicular());
+                [first, axis.cross(first)]
+            };
+            let fixed =
+                |joint: &crate::mechanism::Joint| joint.axis.filter(|_| joint.kind == JointKind::Fixed);
+            match (fixed(&leg.base), fixed(&leg.platform)) {
+                (None, None) => b.chain(two(m, None).map(|w| d(n, w))).collect(),
+                (Some(delta), None) => b.chain(two(n, Some(delta)).map(|w| d(w, m))).collect(),
+                (None, Some(delta)) => c.chain(two(m, Some(delta)).map(|w| d(n, w))).collect(),
+                (Some(below), Some(above)) => {
+                    let [_, side] = two(m, Some(above));
+                    b.chain([d(n, above), d(n, side), d(below, side)]).collect()
+                }
+            }
+        }
+    }
+}
+
+/// What a joint says about the leg's normal n: square to an axis of its body, or along one.
+enum Normal {
+    Across(Vec3<f64>),
+    Along(Vec3<f64>),
+}
+
+fn normal_of(kind: JointKind, joint: &crate::mechanism::Joint) -> Option<Normal> {
+    match kind {
+        JointKind::Spherical => None,
+        JointKind::Universal => joint.axis.map(Normal::Across),
+        JointKind::Revolute => joint.axis.map(Normal::Along),
+        JointKind::Fixed => joint.normal.map(Normal::Along),
+    }
+}
+
+/// Vectors of a constraint at a pose, base axes.
+struct Vectors<T> {
+    e: Vec3<T>,
+    r: Vec3<T>,
+    /// L or a_B.
+    base: Vec3<T>,
+    /// l or a_P.
+    platform: Vec3<T>,
+}
+
+#[inline(always)]
+fn vectors<T: Real>(c: &Constraint, pose: &Pose<T>) -> Vectors<T> {
+    let e = pose.rotation * Vec3::lift(c.platform_point);
+    Vectors {
+        e,
+        r: pose.o + e - Vec3::lift(c.base_point),
+        base: Vec3::lift(c.base_axis),
+        platform: pose.rotation * Vec3::lift(c.platform_axis),
+    }
+}
+
+/// g(pose): metres for kinds A, B and C, a cosine for D \[T9\].
+#[inline(always)]
+pub fn value<T: Real>(c: &Constraint, pose: &Pose<T>) -> T {
+    let Vectors {
+        r, base, platform, ..
+    } = vectors(c, pose);
+    match c.kind {
+        ConstraintKind::A => platform.cross(r).dot(base),
+        ConstraintKind::B => r.dot(base),
+        ConstraintKind::C => r.dot(platform),
+        ConstraintKind::D => base.dot(platform),
+    }
+}
+
+/// The wrench (c, τ) at o with `ġ = c·v + τ·ω` \[T10\]; for kind A it is \[Eq. 11\].
+#[inline(always)]
+pub fn row<T: Real>(constraint: &Constraint, pose: &Pose<T>) -> Wrench<T> {
+    let Vectors { e, r, base, platform } = vectors(constraint, pose);
+    match constraint.kind {
+        ConstraintKind::A => {
+            // [Eq. 11] c = L × l, τ = e × c - l × (L × r)
+            let c = base.cross(platform);
+            Wrench::new(c, e.cross(c) - platform.cross(base.cross(r)))
+        }
+        ConstraintKind::B => Wrench::at(e, base),
+        ConstraintKind::C => Wrench::new(platform, e.cross(platform) + platform.cross(r)),
+        ConstraintKind::D => Wrench::new(Vec3::zero(), platform.cross(base)),
+    }
+}
+
+/// The symmetric 6×6 matrix h with `g̈ = (c, τ)·A + Vᵀ h V` \[T12\]; for kind A the symmetric part of \[Eq. 17\].
+#[inline(always)]
+pub fn hessian<T: Real>(constraint: &Constraint, pose: &Pose<T>) -> Hessian<T> {
+    let Vectors { e, r, base, platform } = vectors(constraint, pose);
+    let mut h = [[T::zero(); 6]; 6];
+    match constraint.kind {
+        ConstraintKind::A => {
+            // g̈ = [l''×r + 2 l'×v_b + l×a_b]·L with l' = ω × l
+            add_centripetal(&mut h, e, base.cross(platform));
+            add_centripetal(&mut h, platform, r.cross(base));
+            add_mixed(&mut h, e, |w| base.cross(w.cross(platform)));
+        }
+        ConstraintKind::B => add_centripetal(&mut h, e, base),
+        ConstraintKind::C => {
+            // g̈ = a_b·a_P + 2 v_b·a_P' + r·a_P''
+            add_centripetal(&mut h, e, platform);
+            add_centripetal(&mut h, platform, r);
+            add_mixed(&mut h, e, |w| w.cross(platform));
+        }
+        ConstraintKind::D => add_centripetal(&mut h, platform, base),
+    }
+    h
+}
+
+/// Adds the form `[ω×(ω×x)]·y = (ω·x)(ω·y) - (x·y) ω·ω`.
+#[inline(always)]
+pub fn add_centripetal<T: Real>(h: &mut Hessian<T>, x: Vec3<T>, y: Vec3<T>) {
+    let (xy, half) = (x.dot(y), T::lit(0.5));
+    let (x, y) = (x.array(), y.array());
+    for i in 0..3 {
+        for j in 0..3 {
+            h[3 + i][3 + j] = h[3 + i][3 + j] + (x[i] * y[j] + y[i] * x[j]) * half;
+        }
+        h[3 + i][3 + i] = h[3 + i][3 + i] - xy;
+    }
+}
+
+/// Adds the form `2 v_b·q(ω)` with `v_b = v + ω×e` and q linear.
+#[inline(always)]
+fn add_mixed<T: Real>(h: &mut Hessian<T>, e: Vec3<T>, q: impl Fn(Vec3<T>) -> Vec3<T>) {
+    let axes = crate::spatial::Mat3::<T>::identity().0;
+    for (j, axis) in axes.into_iter().enumerate() {
+        let q = q(axis);
+        let (linear, angular) = (q.array(), e.cross(q).array());
+        for i in 0..3 {
+            h[i][3 + j] = h[i][3 + j] + linear[i];
+            h[3 + j][i] = h[3 + j][i] + linear[i];
+            h[3 + i][3 + j] = h[3 + i][3 + j] + angular[i];
+            h[3 + j][3 + i] = h[3 + j][3 + i] + angular[i];
+        }
+    }
+}
+
+/// Size of a row with its torque part divided by the length `scale`.
+#[must_use]
+pub fn row_size(row: &Wrench<f64>, scale: f64) -> f64 {
+    let torque = row.torque * (1.0 / scale);
+    (row.force.dot(row.force) + torque.dot(torque)).sqrt()
+}
+
+/// How far the platform must move to satisfy the constraint, to first order, turns counted as arcs at `scale`, m.
+#[must_use]
+pub fn distance(c: &Constraint, pose: &Pose<f64>, scale: f64) -> f64 {
+    value(c, pose).abs() / row_size(&row(c, pose), scale)
+}
+
+/// The unit axis behind a leg's frame in base axes, and whether it turns with the platform.
+#[inline(always)]
+pub fn turning_axis<T: Real>(turning: Turning, pose: &Pose<T>) -> (Vec3<T>, bool) {
+    match turning {
+        Turning::Across(Side::Platform, u) | Turning::Along(Side::Platform, u) => {
+            (pose.rotation * Vec3::lift(u), true)
+        }
+        Turning::Across(Side::Base, u) | Turning::Along(Side::Base, u) | Turning::Free(u) => {
+            (Vec3::lift(u), false)
+        }
+    }
+}

@@ -1,0 +1,505 @@
+//! Coordinate sets: from coordinates to the pose, and from their rates to twist and acceleration.
+//!
+//! Each set is one map from numbers to a pose, written once for any [`Trig`] number. Evaluated with [`Jet`]s it gives
+//! twist and acceleration exactly. Coordinates that a constraint makes dependent are solved first. This is the one
+//! place with trigonometry.
+
+use crate::constraint::{self, ConstraintKind};
+use crate::linear::solve;
+use crate::mechanism::{MAX_CONSTRAINTS, Mechanism};
+use crate::mobility::count;
+use crate::real::{Dual, Jet, Real, Trig};
+use crate::spatial::{Acceleration, Mat3, Pose, Twist, Vec3};
+use crate::status::Status;
+
+/// Most numbers of any set.
+pub const MAX_COORDINATES: usize = 7;
+
+pub type Values<T> = [T; MAX_COORDINATES];
+
+/// Frames of a mechanism whose one independent constraint is of kind A: X along L, x along l.
+#[derive(Clone, Copy, Debug)]
+pub struct Plane {
+    /// Base axes of the angles, columns; the first is L.
+    base: Mat3<f64>,
+    /// Platform axes of the angles, columns; the first is l.
+    platform: Mat3<f64>,
+    /// A point of the line L, base axes: the middle of the base joints that share the constraint.
+    base_point: Vec3<f64>,
+    /// The middle of their platform joints, platform axes; it stays in the plane of L and l.
+    platform_point: Vec3<f64>,
+}
+
+#[derive(Clone, Copy, Debug)]
+pub enum Set {
+    /// (x, y, z, α, β), γ from [Eq. 5] by its branch.
+    Paper(Plane),
+    /// (α, p, h, β, γ): no dependent coordinate, no fold \[T20\].
+    Natural(Plane),
+    /// Tip position and tool axis direction, the turn about the tool from the constraint \[T21\].
+    Tool,
+    /// x, y, z and the angles of Rx(rx) Ry(ry) Rz(rz) \[T22\].
+    Pose,
+}
+
+/// |sin γ| below which the two branches of [Eq. 5] count as one.
+const FOLD: f64 = 1e-6;
+
+/// |cos γ| - 1 that is rounding of one.
+const COSINE_ROUNDING: f64 = 1e-12;
+
+/// Pivot ratio below which the dependent coordinates are not determined.
+const DEPENDENT_PIVOTS: f64 = 1e-9;
+
+const NEWTON_STEPS: usize = 50;
+
+impl Set {
+    #[must_use]
+    pub fn name(&self) -> &'static str {
+        match self {
+            Set::Paper(_) => "paper",
+            Set::Natural(_) => "natural",
+            Set::Tool => "tool",
+            Set::Pose => "pose",
+        }
+    }
+
+    /// All numbers of the set, dependent ones too, in order.
+    #[must_use]
+    pub fn names(&self) -> &'static [&'static str] {
+        match self {
+            Set::Paper(_) => &["x", "y", "z", "alpha", "beta", "gamma"],
+            Set::Natural(_) => &["alpha", "p", "h", "beta", "gamma"],
+            Set::Tool => &["tip_x", "tip_y", "tip_z", "axis_x", "axis_y", "axis_z", "turn"],
+            Set::Pose => &["x", "y", "z", "rx", "ry", "rz"],
+        }
+    }
+
+    /// The sets that a mechanism has.
+    #[must_use]
+    pub fn of(mech: &Mechanism) -> Vec<Set> {
+        let mut sets = Vec::new();
+        if let Some(plane) = Plane::of(mech) {
+            if plane.lever().0.abs() > 1e-9 * mech.characteristic_length {
+                sets.push(Set::Paper(plane));
+            }
+            sets.push(Set::Natural(plane));
+        }
+        if mech.dof() >= 5 {
+            sets.push(Set::Tool);
+        }
+        sets.push(Set::Pose);
+        sets
+    }
+
+    /// Which numbers must be given: for each a `true`; none for the set [`Set::Pose`], where any will do.
+    #[must_use]
+    pub fn given(&self, mech: &Mechanism) -> Option<Vec<bool>> {
+        match self {
+            Set::Paper(_) => Some(vec![true, true, true, true, true, false]),
+            Set::Natural(_) => Some(vec![true; 5]),
+            Set::Tool => Some((0..7).map(|i| i < 6 || mech.dof() == 6).collect()),
+            Set::Pose => None,
+        }
+    }
+
+    /// The map from the numbers to the pose.
+    #[inline(always)]
+    pub fn pose<T: Trig>(&self, mech: &Mechanism, q: &Values<T>) -> Pose<T> {
+        match self {
+            Set::Paper(plane) => {
+                // [Eq. 2] R in the order XYX, o = (X_o, Y_o, Z_o)
+                Pose {
+                    rotation: plane.rotation(q[3], q[4], q[5]),
+                    o: Vec3::new(q[0], q[1], q[2]),
+                }
+            }
+            Set::Natural(plane) => {
+                // [T20] middle of b_1 b_3 = point of L + p L + h Rx(α) e_z
+                let [alpha, p, h, beta, gamma, ..] = *q;
+                let rotation = plane.rotation(alpha, beta, gamma);
+                let (s, c) = alpha.sin_cos();
+                let middle =
+                    Vec3::lift(plane.base_point) + Mat3::lift(plane.base) * Vec3::new(p, -(h * s), h * c);
+                Pose {
+                    rotation,
+                    o: middle - rotation * Vec3::lift(plane.platform_point),
+                }
+            }
+            Set::Tool => {
+                // [T21] R = (home axis → axis) (turn about the home axis) R_home
+                let [x, y, z, i, j, k, turn] = *q;
+                let home_axis = mech.home.rotation * mech.tool_axis;
+                let direction = Vec3::new(i, j, k).unit();
+                let tilt = Mat3::shortest_turn(Vec3::lift(home_axis), direction);
+                let rotation = tilt * turn_about(home_axis, turn) * Mat3::lift(mech.home.rotation);
+                Pose {
+                    rotation,
+                    o: Vec3::new(x, y, z) - rotation * Vec3::lift(mech.tool_point),
+                }
+            }
+            Set::Pose => {
+                let turn = Mat3::rotation_x(q[3].sin_cos())
+                    * Mat3::rotation_y(q[4].sin_cos())
+                    * Mat3::rotation_z(q[5].sin_cos());
+                Pose {
+                    rotation: turn,
+                    o: Vec3::new(q[0], q[1], q[2]),
+                }
+            }
+        }
+    }
+
+    /// The numbers of a pose that satisfies the constraints: the inverse of [`Set::pose`].
+    #[must_use]
+    pub fn values(&self, mech: &Mechanism, pose: &Pose<f64>) -> Values<f64> {
+        let mut q = [0.0; MAX_COORDINATES];
+        let o = pose.o.array();
+        match self {
+            Set::Paper(plane) => {
+                let [alpha, beta, gamma] = plane.angles(pose);
+                q[..6].copy_from_slice(&[o[0], o[1], o[2], alpha, beta, gamma]);
+            }
+            Set::Natural(plane) => {
+                let [alpha, beta, gamma] = plane.angles(pose);
+                let middle = plane.base.transpose_mul(plane.middle(pose));
+                let h = middle.z * alpha.cos() - middle.y * alpha.sin();
+                q[..5].copy_from_slice(&[alpha, middle.x, h, beta, gamma]);
+            }
+            Set::Tool => {
+                let axis = pose.rotation * mech.tool_axis;
+                let home_axis = mech.home.rotation * mech.tool_axis;
+                let turn = Mat3::shortest_turn(home_axis, axis).transpose()
+                    * pose.rotation
+                    * mech.home.rotation.transpose();
+                let across = home_axis.perpendicular();
+                let turned = turn * across;
+                q[..3].copy_from_slice(&(pose.o + pose.rotation * mech.tool_point).array());
+                q[3..6].copy_from_slice(&axis.array());
+                q[6] = home_axis.cross(across).dot(turned).atan2(across.dot(turned));
+            }
+            Set::Pose => {
+                let r = pose.rotation.rows();
+                q[..3].copy_from_slice(&o);
+                q[3] = (-r[1][2]).atan2(r[2][2]);
+                q[4] = r[0][2].atan2(r[1][2].hypot(r[2][2]));
+                q[5] = (-r[0][1]).atan2(r[0][0]);
+            }
+        }
+        q
+    }
+}
+
+impl Plane {
+    /// The frames of a mechanism with one independent constraint, of kind A; none for others.
+    #[must_use]
+    pub fn of(mech: &Mechanism) -> Option<Self> {
+        let [c] = mech.independent.as_slice() else {
+            return None;
+        };
+        if c.kind != ConstraintKind::A {
+            return None;
+        }
+        // The legs whose A constraint is the same one: same axes, platform joints on one line along l.
+        let parallel = |a: Vec3<f64>, b: Vec3<f64>| a.cross(b).norm() <= 1e-9 * a.norm() * b.norm();
+        let sharing: Vec<_> = mech
+            .constraints
+            .iter()
+            .filter(|d| {
+                d.kind == ConstraintKind::A
+                    && parallel(c.base_axis, d.base_axis)
+                    && parallel(c.platform_axis, d.platform_axis)
+                    && (d.leg == c.leg
+                        || (parallel(c.base_axis, d.base_point - c.base_point)
+                            && parallel(c.platform_axis, d.platform_point - c.platform_point)))
+            })
+            .collect();
+        let share = 1.0 / count(sharing.len());
+        let mean = |point: fn(&constraint::Constraint) -> Vec3<f64>| {
+            sharing
+                .iter()
+                .map(|d| point(d))
+                .fold(Vec3::zero(), |sum, p| sum + p)
+                * share
+        };
+        Some(Plane {
+            base: frame_along(c.base_axis),
+            platform: frame_along(c.platform_axis),
+            base_point: mean(|d| d.base_point),
+            platform_point: mean(|d| d.platform_point),
+        })
+    }
+
+    /// [Eq. 2] `R = Rx(α) Ry(β) Rx(γ)` between the plane's axes of base and platform.
+    #[inline(always)]
+    fn rotation<T: Trig>(&self, alpha: T, beta: T, gamma: T) -> Mat3<T> {
+        let xyx = Mat3::rotation_x(alpha.sin_cos())
+            * Mat3::rotation_y(beta.sin_cos())
+            * Mat3::rotation_x(gamma.sin_cos());
+        Mat3::lift(self.base) * xyx * Mat3::lift(self.platform.transpose())
+    }
+
+    /// The signed distance of the reference point from the line through o along l, and its angle about that line,
+    /// within a quarter turn of y: for the paper (e sin θ_1, 0).
+    fn lever(&self) -> (f64, f64) {
+        let m = self.platform.transpose_mul(self.platform_point);
+        let sign = if m.y < 0.0 { -1.0 } else { 1.0 };
+        (sign * m.y.hypot(m.z), (sign * m.z).atan2(sign * m.y))
+    }
+
+    /// cos of γ plus the lever's angle, by [Eq. 5]: the reference point stays in the plane of L and l, whose normal
+    /// is Rx(α) e_y.
+    #[inline(always)]
+    fn cosine<T: Trig>(&self, o: Vec3<T>, alpha: T) -> T {
+        let (s, c) = alpha.sin_cos();
+        let normal = Mat3::lift(self.base) * Vec3::new(T::zero(), c, s);
+        normal.dot(Vec3::lift(self.base_point) - o) / T::lit(self.lever().0)
+    }
+
+    /// From the point of L to the reference point, base axes.
+    fn middle(&self, pose: &Pose<f64>) -> Vec3<f64> {
+        pose.o + pose.rotation * self.platform_point - self.base_point
+    }
+
+    /// (α, β, γ), with α that of the half plane from L to the reference point.
+    fn angles(&self, pose: &Pose<f64>) -> [f64; 3] {
+        let middle = self.base.transpose_mul(self.middle(pose));
+        let alpha = (-middle.y).atan2(middle.z);
+        let turn = self.base.transpose() * pose.rotation * self.platform;
+        let rest = Mat3::rotation_x((-alpha).sin_cos()) * turn;
+        let l = rest.0[0];
+        let beta = (-l.z).atan2(l.x);
+        let gamma = (Mat3::rotation_y((-beta).sin_cos()) * rest).0[1];
+        [alpha, beta, gamma.z.atan2(gamma.y)]
+    }
+}
+
+/// Columns x along `axis`, z as near to the body's z as it can be, y to the right of both.
+fn frame_along(axis: Vec3<f64>) -> Mat3<f64> {
+    let x = axis.unit();
+    let y = Vec3::Z.cross(x);
+    let y = if y.norm() > 1e-9 { y.unit() } else { Vec3::Y };
+    Mat3::from_columns(x, y, x.cross(y))
+}
+
+/// Rodrigues' formula for a turn about a constant unit axis.
+#[inline(always)]
+fn turn_about<T: Trig>(axis: Vec3<f64>, angle: T) -> Mat3<T> {
+    let (s, c) = angle.sin_cos();
+    Mat3([Vec3::X, Vec3::Y, Vec3::Z].map(|e: Vec3<f64>| {
+        let along = axis * axis.dot(e);
+        Vec3::lift(along) + Vec3::lift(e - along) * c + Vec3::lift(axis.cross(e)) * s
+    }))
+}
+
+/// A state of the platform with all numbers of its coordinate set.
+#[derive(Clone, Copy, Debug)]
+pub struct State {
+    pub coordinates: Values<Jet<f64>>,
+    pub pose: Pose<f64>,
+    pub twist: Twist<f64>,
+    pub acceleration: Acceleration<f64>,
+    pub status: Status,
+}
+
+/// Pose, twist and acceleration from the given coordinates and their rates; dependent ones are solved from the
+/// constraints, starting at those of `guess`.
+///
+/// `given` marks the entries of `q` that are given. `branch` is the sign of sin γ for [Eq. 5].
+#[must_use]
+pub fn state(
+    mech: &Mechanism,
+    set: &Set,
+    q: &Values<Jet<f64>>,
+    given: &[bool],
+    branch: f64,
+    guess: &Pose<f64>,
+) -> State {
+    let mut q = *q;
+    let finite = q
+        .iter()
+        .zip(given)
+        .all(|(c, g)| !g || (c.x.is_finite() && c.d.is_finite() && c.dd.is_finite()));
+    let status = if finite {
+        match set {
+            Set::Paper(plane) => branch_of_gamma(plane, &mut q, branch),
+            _ => solve_dependent(mech, set, &mut q, given, guess),
+        }
+    } else {
+        Status::InvalidInput
+    };
+    let pose = set.pose(mech, &q);
+    let mut state = State {
+        coordinates: q,
+        pose: Pose {
+            rotation: Mat3(pose.rotation.0.map(|c| c.map(|j| j.x))),
+            o: pose.o.map(|j| j.x),
+        },
+        twist: Twist::new(pose.o.map(|j| j.d), half_cross(&pose.rotation, |j| j.d)),
+        acceleration: Acceleration::new(pose.o.map(|j| j.dd), half_cross(&pose.rotation, |j| j.dd)),
+        status,
+    };
+    if status == Status::Ok && state.pose.rotation.0.iter().any(|c| !c.norm().is_finite()) {
+        state.status = Status::Fold;
+    }
+    state
+}
+
+/// `½ Σ x_i × x_i'` over the columns of R is ω, `½ Σ x_i × x_i''` is ε \[T19\].
+fn half_cross(r: &Mat3<Jet<f64>>, part: fn(Jet<f64>) -> f64) -> Vec3<f64> {
+    r.0.iter()
+        .map(|c| c.map(|j| j.x).cross(c.map(part)))
+        .fold(Vec3::zero(), |sum, w| sum + w)
+        * 0.5
+}
+
+/// γ from [Eq. 5]: `γ = ± arccos(...)`, the sign being the branch.
+fn branch_of_gamma(plane: &Plane, q: &mut Values<Jet<f64>>, branch: f64) -> Status {
+    let cosine = plane.cosine(Vec3::new(q[0], q[1], q[2]), q[3]);
+    let sign = branch.signum();
+    let offset = Jet::lit(plane.lever().1);
+    let nan = Jet::new(f64::NAN, f64::NAN, f64::NAN);
+    if !(cosine.x.abs() <= 1.0 + COSINE_ROUNDING) {
+        q[5] = nan;
+        return Status::NoBranch;
+    }
+    if 1.0 - cosine.x * cosine.x < FOLD * FOLD {
+        let gamma = sign * cosine.x.clamp(-1.0, 1.0).acos();
+        q[5] = Jet::new(gamma, f64::NAN, f64::NAN) - offset;
+        return Status::Fold;
+    }
+    q[5] = Jet::lit(sign) * cosine.acos() - offset;
+    Status::Ok
+}
+
+type System = [f64; MAX_CONSTRAINTS];
+
+/// Newton on the independent constraints for the coordinates that are not given, then their rates and second rates
+/// from the same matrix: `G_y y' = -ġ(y' = 0)`, `G_y y'' = -g̈(y'' = 0)` \[T23\].
+fn solve_dependent(
+    mech: &Mechanism,
+    set: &Set,
+    q: &mut Values<Jet<f64>>,
+    given: &[bool],
+    guess: &Pose<f64>,
+) -> Status {
+    let dependent: Vec<usize> = (0..set.names().len()).filter(|&i| !given[i]).collect();
+    if dependent.is_empty() {
+        return Status::Ok;
+    }
+    let start = set.values(mech, guess);
+    for &i in &dependent {
+        q[i] = Jet::lit(start[i]);
+    }
+    let scale = mech.characteristic_length;
+    let residual = |q: &Values<Jet<f64>>| -> System {
+        let pose = set.pose(mech, &q.map(|c| c.x));
+        std::array::from_fn(|k| {
+            mech.independent
+                .get(k)
+                .map_or(0.0, |c| constraint::value(c, &pose) / unit(c, scale))
+        })
+    };
+    let size = |g: &System| {
+        g.iter().fold(
+            0.0_f64,
+            |m, e| if e.abs() > m || e.is_nan() { e.abs() } else { m },
+        )
+    };
+
+    let mut g = residual(q);
+    let mut converged = false;
+    for _ in 0..NEWTON_STEPS {
+        let (step, _) = solve(gradient(mech, set, q, &dependent), g.map(|e| -e));
+        // No coordinate moves by more than half a radian or half the characteristic length at once.
+        let largest = dependent
+            .iter()
+            .zip(&step)
+            .map(|(&i, s)| s.abs() / reach(set, i, scale))
+            .fold(0.0, f64::max);
+        if !size(&step).is_finite() {
+            break;
+        }
+        let mut share = (0.5 / largest).min(1.0);
+        let from = *q;
+        for _ in 0..8 {
+            for (&i, s) in dependent.iter().zip(&step) {
+                q[i].x = from[i].x + share * s;
+            }
+            g = residual(q);
+            if size(&g) <= size(&residual(&from)) {
+                break;
+            }
+            share *= 0.5;
+        }
+        if largest <= 1e-13 || size(&g) == 0.0 {
+            converged = true;
+            break;
+        }
+        converged = largest <= 1e-10;
+    }
+    if !converged {
+        for &i in &dependent {
+            q[i] = Jet::new(f64::NAN, f64::NAN, f64::NAN);
+        }
+        return Status::NotConverged;
+    }
+    let matrix = gradient(mech, set, q, &dependent);
+    let rates = |q: &Values<Jet<f64>>, part: fn(Jet<f64>) -> f64| -> (System, f64) {
+        let pose = set.pose(mech, q);
+        let rhs = std::array::from_fn(|k| {
+            mech.independent
+                .get(k)
+                .map_or(0.0, |c| -part(constraint::value(c, &pose)) / unit(c, scale))
+        });
+        solve(matrix, rhs)
+    };
+    let (first, pivots) = rates(q, |j| j.d);
+    if !(pivots > DEPENDENT_PIVOTS) {
+        for &i in &dependent {
+            q[i] = Jet::new(q[i].x, f64::NAN, f64::NAN);
+        }
+        return Status::Fold;
+    }
+    for (&i, d) in dependent.iter().zip(&first) {
+        q[i].d = *d;
+    }
+    let (second, _) = rates(q, |j| j.dd);
+    for (&i, dd) in dependent.iter().zip(&second) {
+        q[i].dd = *dd;
+    }
+    Status::Ok
+}
+
+/// What makes a constraint's value a pure number.
+fn unit(c: &constraint::Constraint, scale: f64) -> f64 {
+    if c.kind == ConstraintKind::D { 1.0 } else { scale }
+}
+
+/// What one unit of a dependent coordinate's step is measured by: a length or a radian.
+fn reach(set: &Set, index: usize, scale: f64) -> f64 {
+    match set {
+        Set::Pose if index < 3 => scale,
+        _ => 1.0,
+    }
+}
+
+/// ∂g/∂y by duals, unused rows and columns those of the identity.
+fn gradient(
+    mech: &Mechanism,
+    set: &Set,
+    q: &Values<Jet<f64>>,
+    dependent: &[usize],
+) -> [System; MAX_CONSTRAINTS] {
+    let mut matrix: [System; MAX_CONSTRAINTS] =
+        std::array::from_fn(|i| std::array::from_fn(|j| if i == j { 1.0 } else { 0.0 }));
+    for (column, &i) in dependent.iter().enumerate() {
+        let mut seeded = q.map(|c| Dual::new(c.x, 0.0));
+        seeded[i].d = 1.0;
+        let pose = set.pose(mech, &seeded);
+        for (row, c) in mech.independent.iter().enumerate() {
+            matrix[row][column] = constraint::value(c, &pose).d / unit(c, mech.characteristic_length);
+        }
+    }
+    matrix
+}

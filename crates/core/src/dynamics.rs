@@ -1,0 +1,244 @@
+//! Inverse dynamics by virtual power: every link's weight and inertia is carried to the platform's twist by the
+//! transpose of its own Jacobian, then actuators and constraints balance the sum [Eq. 40-43] \[T13\]-\[T17\].
+
+use crate::jacobian::{Matrix6, jacobian};
+use crate::leg;
+use crate::linear::solve;
+use crate::mechanism::{Body, Leg, Mechanism, Rod};
+use crate::real::Real;
+use crate::spatial::{Acceleration, Mat3, Pose, Twist, Vec3, Wrench};
+use crate::spec::Axes;
+
+/// The load on the platform at o; in platform axes it turns with the platform.
+#[inline(always)]
+pub fn load_in_base<T: Real>(wrench: Wrench<T>, axes: Axes, pose: &Pose<T>) -> Wrench<T> {
+    match axes {
+        Axes::Base => wrench,
+        Axes::Platform => Wrench::new(pose.rotation * wrench.force, pose.rotation * wrench.torque),
+    }
+}
+
+/// Weight and inertial force of a link with the acceleration `a` of its mass centre [Eq. 40] \[T13\]:
+/// `G + f = m (g - a)`.
+#[inline(always)]
+fn inertial_force<T: Real>(body: &Body, gravity: Vec3<T>, a: Vec3<T>) -> Vec3<T> {
+    (gravity - a) * T::lit(body.mass)
+}
+
+/// Inertial torque `t = -(I ε + ω × I ω)` with the inertia turned into base axes [Eq. 40, completed] \[T13\].
+#[inline(always)]
+fn inertial_torque<T: Real>(body: &Body, axes: Mat3<T>, omega: Vec3<T>, eps: Vec3<T>) -> Vec3<T> {
+    let inertia = Mat3::lift(body.inertia);
+    let (omega, eps) = (axes.transpose_mul(omega), axes.transpose_mul(eps));
+    -(axes * (inertia * eps + omega.cross(inertia * omega)))
+}
+
+/// The platform's own term of [Eq. 42]: weight, inertia and damping, as a wrench at o.
+#[inline(always)]
+pub fn platform_wrench<T: Real>(
+    mech: &Mechanism,
+    pose: &Pose<T>,
+    twist: &Twist<T>,
+    acceleration: &Acceleration<T>,
+) -> Wrench<T> {
+    let body = &mech.platform;
+    let center = pose.rotation * Vec3::lift(body.center);
+    let a = acceleration.a + acceleration.eps.cross(center) + twist.omega.cross(twist.omega.cross(center));
+    let force = inertial_force(body, Vec3::lift(mech.gravity), a);
+    let torque = inertial_torque(body, pose.rotation, twist.omega, acceleration.eps);
+    // f_d = -μ v, t_d = -μ ω
+    let damping = Wrench::new(
+        -(twist.v * T::lit(mech.linear_damping)),
+        -(twist.omega * T::lit(mech.angular_damping)),
+    );
+    Wrench::at(center, force) + Wrench::new(Vec3::zero(), torque) + damping
+}
+
+/// Cylinder, piston and the rods that the leg leads, carried to the platform \[T14\].
+#[inline(always)]
+fn leg_wrench<T: Real>(
+    mech: &Mechanism,
+    index: usize,
+    leg: &Leg,
+    pose: &Pose<T>,
+    twist: &Twist<T>,
+    acceleration: &Acceleration<T>,
+) -> Wrench<T> {
+    let gravity = Vec3::lift(mech.gravity);
+    let p = leg::position(leg, pose);
+    let m = leg::motion(&p, twist, acceleration);
+    let f = leg::frame(leg, pose, &p);
+    let turn = leg::turn(leg, pose, &p, &m, &f, twist, acceleration);
+
+    let (piston, cylinder) = (leg::piston(leg, &m, &f, &turn), leg::cylinder(leg, &f, &turn));
+    let force = inertial_force(&leg.piston, gravity, piston.acceleration);
+    let torque = piston.offset.cross(force)
+        + cylinder
+            .offset
+            .cross(inertial_force(&leg.cylinder, gravity, cylinder.acceleration))
+        + inertial_torque(&leg.piston, f.axes, turn.omega, turn.eps)
+        + inertial_torque(&leg.cylinder, f.axes, turn.omega, turn.eps);
+    let mut wrench = leg::carry(leg, &p, &f, force, torque);
+    for rod in mech.rods.iter().filter(|rod| rod.leader == index) {
+        let about = rod_torque(mech, rod, &m, &f, &turn);
+        // The rod's power is its torque about L times ω_L = n·δ'/|L×δ|, with δ' = (v_b - ℓ'δ)/ℓ and n square to δ.
+        wrench = wrench + Wrench::at(p.e, f.n() * (about / (f.sine * p.length)));
+    }
+    wrench
+}
+
+/// Torque of the rod's weight and inertia about its line, in the rod's axes (L, n, L×n) [Eq. 36, 42].
+#[inline(always)]
+fn rod_torque<T: Real>(
+    mech: &Mechanism,
+    rod: &Rod,
+    m: &leg::Motion<T>,
+    f: &leg::Frame<T>,
+    turn: &leg::Turn<T>,
+) -> T {
+    let axis = Vec3::lift(rod.axis);
+    let rod_turn = leg::rod_turn(axis, m, f, turn);
+    let (omega, eps) = (axis * rod_turn.rate, axis * rod_turn.acceleration);
+    let axes = Mat3::from_columns(axis, f.n(), axis.cross(f.n()));
+    let center = axes * Vec3::lift(rod.body.center);
+    let a = eps.cross(center) + omega.cross(omega.cross(center));
+    let force = inertial_force(&rod.body, Vec3::lift(mech.gravity), a);
+    axis.dot(center.cross(force) + inertial_torque(&rod.body, axes, omega, eps))
+}
+
+/// All that the actuators and constraints must balance, as a wrench at o: the braces of [Eq. 43]. The paper's
+/// efficiency η divides the platform's term alone.
+#[inline(always)]
+pub fn resultant<T: Real>(
+    mech: &Mechanism,
+    pose: &Pose<T>,
+    twist: &Twist<T>,
+    acceleration: &Acceleration<T>,
+    load: Wrench<T>,
+) -> Wrench<T> {
+    let platform = load + platform_wrench(mech, pose, twist, acceleration);
+    let mut sum = platform * T::lit(1.0 / mech.efficiency);
+    for (i, leg) in mech.legs.iter().enumerate() {
+        sum = sum + leg_wrench(mech, i, leg, pose, twist, acceleration);
+    }
+    sum
+}
+
+/// Active forces along the actuated legs, then the multipliers of the independent constraints:
+/// `F_r = -J⁻ᵀ {...}` [Eq. 43], with the pivot ratio of J.
+#[inline(always)]
+pub fn inverse_dynamics<T: Real>(
+    mech: &Mechanism,
+    pose: &Pose<T>,
+    twist: &Twist<T>,
+    acceleration: &Acceleration<T>,
+    load: Wrench<T>,
+) -> ([T; 6], f64) {
+    let w = resultant(mech, pose, twist, acceleration, load).array();
+    solve(transposed(&jacobian(mech, pose)), w.map(|x| -x))
+}
+
+#[inline(always)]
+fn transposed<T: Real>(m: &Matrix6<T>) -> Matrix6<T> {
+    std::array::from_fn(|i| std::array::from_fn(|j| m[j][i]))
+}
+
+/// Kinetic and potential energy of all links \[T17\]. Velocities only: with duals along the motion it
+/// gives the power of inertia and weight without the way that [`inverse_dynamics`] takes.
+#[inline(always)]
+pub fn energy<T: Real>(mech: &Mechanism, pose: &Pose<T>, twist: &Twist<T>) -> (T, T) {
+    let gravity = Vec3::lift(mech.gravity);
+    let rest = Acceleration::zero();
+    let link = |body: &Body, axes: Mat3<T>, omega: Vec3<T>, velocity: Vec3<T>, place: Vec3<T>| {
+        let (omega, mass) = (axes.transpose_mul(omega), T::lit(body.mass));
+        let kinetic =
+            (velocity.dot(velocity) * mass + omega.dot(Mat3::lift(body.inertia) * omega)) * T::lit(0.5);
+        (kinetic, -(gravity.dot(place) * mass))
+    };
+    let center = pose.rotation * Vec3::lift(mech.platform.center);
+    let mut sum = link(
+        &mech.platform,
+        pose.rotation,
+        twist.omega,
+        twist.v + twist.omega.cross(center),
+        pose.o + center,
+    );
+    let mut add = |(kinetic, potential): (T, T)| sum = (sum.0 + kinetic, sum.1 + potential);
+    for (i, leg) in mech.legs.iter().enumerate() {
+        let p = leg::position(leg, pose);
+        let m = leg::motion(&p, twist, &rest);
+        let f = leg::frame(leg, pose, &p);
+        let turn = leg::turn(leg, pose, &p, &m, &f, twist, &rest);
+        let base = Vec3::lift(leg.base.point);
+        let (piston, cylinder) = (leg::piston(leg, &m, &f, &turn), leg::cylinder(leg, &f, &turn));
+        add(link(
+            &leg.piston,
+            f.axes,
+            turn.omega,
+            piston.velocity,
+            base + p.r + piston.offset,
+        ));
+        add(link(
+            &leg.cylinder,
+            f.axes,
+            turn.omega,
+            cylinder.velocity,
+            base + cylinder.offset,
+        ));
+        for rod in mech.rods.iter().filter(|rod| rod.leader == i) {
+            let axis = Vec3::lift(rod.axis);
+            let omega = axis * leg::rod_turn(axis, &m, &f, &turn).rate;
+            let axes = Mat3::from_columns(axis, f.n(), axis.cross(f.n()));
+            let center = axes * Vec3::lift(rod.body.center);
+            add(link(
+                &rod.body,
+                axes,
+                omega,
+                omega.cross(center),
+                Vec3::lift(rod.point) + center,
+            ));
+        }
+    }
+    sum
+}
+
+/// Forces along c_1 that two coupled legs put on the platform at their ends, and the torque T_c about the rod's line.
+#[derive(Clone, Copy, Debug)]
+pub struct Coupled<T> {
+    pub forces: [T; 2],
+    pub torque: T,
+}
+
+/// The couple-constrained forces of two legs on one rod from the constraint's multiplier f_c \[T16\].
+///
+/// The consistent balance: the rod is free to turn about L, so the moments of both forces about L cancel, and
+/// together they are the wrench f_c (c, τ): `f_c1 = f_c d_3/l`, `f_c3 = -f_c d_1/l`, `T_c = f_c1 d_1`.
+/// As printed [Eq. 44]: `f_c1 = f_c/(1 + k)`, `f_c3 = f_c - f_c1`, `k = d_1/d_3`, which takes c_3 for c_1 where the
+/// paper has c_3 = -c_1.
+#[inline(always)]
+pub fn coupled_forces<T: Real>(
+    mech: &Mechanism,
+    pair: [usize; 2],
+    axis: Vec3<f64>,
+    platform_axis: Vec3<f64>,
+    pose: &Pose<T>,
+    f_c: T,
+    as_printed: bool,
+) -> Coupled<T> {
+    let (axis, l) = (Vec3::lift(axis), pose.rotation * Vec3::lift(platform_axis));
+    let [first, third] = pair.map(|i| leg::position(&mech.legs[i], pose));
+    // c_1 along r_1 × L; d_i is the moment arm about L of a force along c_1 at b_i.
+    let c1 = first.r.cross(axis).unit();
+    let [d1, d3] = [first, third].map(|p| p.r.cross(axis).dot(c1));
+    let length = (first.e - third.e).dot(l);
+    let forces = if as_printed {
+        let f1 = f_c / (T::one() + d1 / d3);
+        [f1, f_c - f1]
+    } else {
+        [f_c * d3 / length, -(f_c * d1 / length)]
+    };
+    Coupled {
+        forces,
+        torque: forces[0] * d1,
+    }
+}

@@ -1,0 +1,80 @@
+//! The completed Jacobian and Hessian: rows of the actuated legs over rows of the independent constraints, and the
+//! solves with them.
+
+use crate::constraint::{self, Hessian};
+use crate::leg;
+use crate::linear::solve;
+use crate::mechanism::Mechanism;
+use crate::real::Real;
+use crate::spatial::{Acceleration, Pose, Twist, Wrench};
+
+pub type Matrix6<T> = [[T; 6]; 6];
+
+/// J of `J V = (ℓ', 0)`, its rows (δ, e×δ) and (c, τ) [Eq. 13].
+#[inline(always)]
+pub fn jacobian<T: Real>(mech: &Mechanism, pose: &Pose<T>) -> Matrix6<T> {
+    let mut rows = [Wrench::zero(); 6];
+    let legs = mech
+        .actuated()
+        .map(|(_, leg)| leg::row(&leg::position(leg, pose)));
+    let constraints = mech.independent.iter().map(|c| constraint::row(c, pose));
+    for (row, wrench) in rows.iter_mut().zip(legs.chain(constraints)) {
+        *row = wrench;
+    }
+    rows.map(Wrench::array)
+}
+
+/// H of `J A + Vᵀ H V = (ℓ'', 0)`, one symmetric 6×6 layer for each row of J [Eq. 19].
+#[inline(always)]
+pub fn hessian<T: Real>(mech: &Mechanism, pose: &Pose<T>) -> [Hessian<T>; 6] {
+    let mut layers = [[[T::zero(); 6]; 6]; 6];
+    let legs = mech
+        .actuated()
+        .map(|(_, leg)| leg::hessian(&leg::position(leg, pose)));
+    let constraints = mech.independent.iter().map(|c| constraint::hessian(c, pose));
+    for (layer, h) in layers.iter_mut().zip(legs.chain(constraints)) {
+        *layer = h;
+    }
+    layers
+}
+
+/// The platform's twist from the rates of the actuated legs, and the pivot ratio of J [Eq. 13].
+#[inline(always)]
+pub fn platform_twist<T: Real>(mech: &Mechanism, pose: &Pose<T>, rates: &[T]) -> (Twist<T>, f64) {
+    let (v, pivots) = solve(jacobian(mech, pose), padded(rates));
+    (Twist::from_array(v), pivots)
+}
+
+/// The platform's acceleration from those of the actuated legs: `A = J⁻¹ (ℓ'' - Vᵀ H V)` [Eq. 19].
+#[inline(always)]
+pub fn platform_acceleration<T: Real>(
+    mech: &Mechanism,
+    pose: &Pose<T>,
+    twist: &Twist<T>,
+    accelerations: &[T],
+) -> (Acceleration<T>, f64) {
+    let mut rhs = padded(accelerations);
+    let v = twist.array();
+    for (entry, h) in rhs.iter_mut().zip(hessian(mech, pose)) {
+        *entry = *entry - quadratic(&h, &v);
+    }
+    let (a, pivots) = solve(jacobian(mech, pose), rhs);
+    (Acceleration::from_array(a), pivots)
+}
+
+/// `vᵀ h v`.
+#[inline(always)]
+pub fn quadratic<T: Real>(h: &Hessian<T>, v: &[T; 6]) -> T {
+    let mut sum = T::zero();
+    for i in 0..6 {
+        for j in 0..6 {
+            sum = (v[i] * h[i][j]).mul_add(v[j], sum);
+        }
+    }
+    sum
+}
+
+#[inline(always)]
+fn padded<T: Real>(values: &[T]) -> [T; 6] {
+    std::array::from_fn(|i| values.get(i).copied().unwrap_or_else(T::zero))
+}

@@ -1,0 +1,20 @@
+//! The equations of parallel manipulators on telescopic legs, generic over the number.
+//!
+//! Labels in brackets name their source: `[Eq. 26]` an equation of Lu, Liu, Zhang, Ye and Wang, "Dynamics analysis of
+//! a novel 5-DoF parallel manipulator with couple-constrained wrench"; `[T6]` one of `docs/theory.md`.
+
+pub mod batch;
+pub mod constraint;
+pub mod coordinates;
+pub mod dynamics;
+pub mod jacobian;
+pub mod joints;
+pub mod leg;
+pub mod linear;
+pub mod mechanism;
+pub mod mobility;
+pub mod real;
+pub mod singularity;
+pub mod spatial;
+pub mod spec;
+pub mod status;

@@ -1,0 +1,432 @@
+//! Mobility from ranks: which constraints are independent, how many loop closures are redundant and which legs they
+//! couple, which freedoms are passive \[T18\].
+//!
+//! Ranks are taken at several generic poses, reached from the home pose by steps of about a third of the
+//! mechanism's size, and the largest counts: at a singular pose a rank only drops.
+
+use nalgebra::{DMatrix, DVector};
+use serde::Serialize;
+
+use crate::constraint::{self, Constraint};
+use crate::leg;
+use crate::mechanism::{Leg, Mechanism, Side, Turning};
+use crate::spatial::{Mat3, Pose, Vec3, Wrench};
+use crate::spec::JointKind;
+
+/// A link of the topology graph with the numbers of its joints.
+#[derive(Clone, Debug, Serialize)]
+pub struct GraphLink {
+    pub name: String,
+    pub joints: Vec<usize>,
+}
+
+/// A joint of the topology graph between two links.
+#[derive(Clone, Debug, Serialize)]
+pub struct GraphJoint {
+    pub kind: &'static str,
+    pub name: String,
+    pub links: [usize; 2],
+}
+
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct Graph {
+    pub links: Vec<GraphLink>,
+    pub joints: Vec<GraphJoint>,
+}
+
+/// The accounting of [Eq. 1], from ranks.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct Mobility {
+    pub dof: usize,
+    pub links: usize,
+    pub joints: usize,
+    /// Sum of the joints' freedoms.
+    pub joint_freedoms: usize,
+    pub loops: usize,
+    /// Rank of the loop closures, at most six for each loop.
+    pub closure_rank: usize,
+    /// Closure equations that say nothing new.
+    pub redundant: usize,
+    /// Legs (from 0) whose constraints the redundant ones couple.
+    pub redundant_legs: Vec<usize>,
+    /// Freedoms that leave the platform where it is.
+    pub passive: usize,
+    /// Legs (from 0) that have them.
+    pub passive_legs: Vec<usize>,
+    /// Scalar constraints of the legs: leg (from 0) and kind, and whether it is one of the independent ones.
+    pub constraints: Vec<ConstraintRow>,
+    pub graph: Graph,
+}
+
+#[derive(Clone, Debug, Serialize)]
+pub struct ConstraintRow {
+    pub leg: usize,
+    pub kind: String,
+    pub independent: bool,
+}
+
+/// Singular values below this share of the largest count as zero.
+const RANK_TOLERANCE: f64 = 1e-9;
+
+/// Generic poses looked at.
+const SAMPLES: u32 = 12;
+
+const NEWTON_STEPS: usize = 60;
+
+/// A small count as a number: exact.
+#[must_use]
+pub fn count(n: usize) -> f64 {
+    u32::try_from(n).map_or(f64::INFINITY, f64::from)
+}
+
+/// Independent constraints and the mobility of a mechanism whose parts are in place.
+#[must_use]
+pub fn analyse(mech: &Mechanism) -> (Vec<Constraint>, Mobility) {
+    let poses = generic_poses(mech);
+    let chosen = independent_rows(mech, &poses);
+    let independent = chosen.iter().map(|&i| mech.constraints[i]).collect::<Vec<_>>();
+    let graph = graph(mech);
+
+    let closures: Vec<Closure> = poses.iter().map(|pose| closure(mech, pose)).collect();
+    let freedoms: usize = graph.joints.iter().map(|j| joint_freedoms(j.kind)).sum();
+    let loops = graph.joints.len() + 1 - graph.links.len();
+    let best = closures.iter().max_by_key(|c| c.rank);
+    let rank = best.map_or(0, |c| c.rank).saturating_sub(6);
+    let total = freedoms - rank;
+    let dof = 6 - independent.len();
+    let mobility = Mobility {
+        dof,
+        links: graph.links.len(),
+        joints: graph.joints.len(),
+        joint_freedoms: freedoms,
+        loops,
+        closure_rank: rank,
+        redundant: 6 * loops - rank,
+        redundant_legs: best.map_or_else(Vec::new, |c| c.redundant_legs.clone()),
+        passive: total.saturating_sub(dof),
+        passive_legs: best.map_or_else(Vec::new, |c| c.passive_legs.clone()),
+        constraints: mech
+            .constraints
+            .iter()
+            .enumerate()
+            .map(|(i, c)| ConstraintRow {
+                leg: c.leg,
+                kind: format!("{:?}", c.kind),
+                independent: chosen.contains(&i),
+            })
+            .collect(),
+        graph,
+    };
+    (independent, mobility)
+}
+
+fn joint_freedoms(kind: &str) -> usize {
+    match kind {
+        "S" => 3,
+        "U" => 2,
+        _ => 1,
+    }
+}
+
+/// Poses near home that satisfy the constraints, the same ones every time.
+fn generic_poses(mech: &Mechanism) -> Vec<Pose<f64>> {
+    let mut seed = 0x2545_F491_4F6C_DD1D_u64;
+    let mut uniform = move || {
+        // xorshift64*: any fixed generic direction will do.
+        seed ^= seed >> 12;
+        seed ^= seed << 25;
+        seed ^= seed >> 27;
+        let bits = u32::try_from(seed.wrapping_mul(0x2545_F491_4F6C_DD1D) >> 32).unwrap_or(0);
+        f64::from(bits) / f64::from(u32::MAX) * 2.0 - 1.0
+    };
+    let size = mech.characteristic_length;
+    let mut poses = Vec::new();
+    for _ in 0..SAMPLES {
+        let mut vector = || Vec3::new(uniform(), uniform(), uniform());
+        let start = Pose {
+            rotation: Mat3::from_rotation_vector(vector() * 0.3) * mech.home.rotation,
+            o: mech.home.o + vector() * (0.3 * size),
+        };
+        poses.extend(project(mech, &start));
+    }
+    if poses.is_empty() {
+        poses.push(mech.home);
+    }
+    poses
+}
+
+/// The pose that satisfies all constraints, found from `start` by Gauss-Newton steps of least size, or none.
+#[must_use]
+pub fn project(mech: &Mechanism, start: &Pose<f64>) -> Option<Pose<f64>> {
+    let size = mech.characteristic_length;
+    let mut pose = *start;
+    for _ in 0..NEWTON_STEPS {
+        let rows: Vec<Wrench<f64>> = mech
+            .constraints
+            .iter()
+            .map(|c| constraint::row(c, &pose))
+            .collect();
+        let sizes: Vec<f64> = rows.iter().map(|row| constraint::row_size(row, size)).collect();
+        let residual = DVector::from_iterator(
+            rows.len(),
+            mech.constraints
+                .iter()
+                .zip(&sizes)
+                .map(|(c, s)| constraint::value(c, &pose) / s),
+        );
+        if residual.amax() <= 1e-13 * size {
+            return Some(pose);
+        }
+        if !residual.amax().is_finite() {
+            return None;
+        }
+        let g = scaled_rows(&rows, &sizes, size);
+        let step = g.svd(true, true).solve(&residual, RANK_TOLERANCE).ok()?;
+        let [x, y, z, p, q, r]: [f64; 6] = std::array::from_fn(|i| -step[i]);
+        pose.o = pose.o + Vec3::new(x, y, z);
+        pose.rotation = Mat3::from_rotation_vector(Vec3::new(p, q, r) * (1.0 / size)) * pose.rotation;
+    }
+    None
+}
+
+/// Rows (c, τ/scale) divided by their size, so that ranks and steps have one unit.
+fn scaled_rows(rows: &[Wrench<f64>], sizes: &[f64], scale: f64) -> DMatrix<f64> {
+    DMatrix::from_fn(rows.len(), 6, |i, j| {
+        let row = rows[i].array();
+        (if j < 3 { row[j] } else { row[j] / scale }) / sizes[i]
+    })
+}
+
+/// Indices of the constraints that raise the rank, taken in the order of the legs, at the poses of largest rank.
+fn independent_rows(mech: &Mechanism, poses: &[Pose<f64>]) -> Vec<usize> {
+    let size = mech.characteristic_length;
+    let choose = |pose: &Pose<f64>| {
+        let rows: Vec<Wrench<f64>> = mech
+            .constraints
+            .iter()
+            .map(|c| constraint::row(c, pose))
+            .collect();
+        let sizes: Vec<f64> = rows.iter().map(|row| constraint::row_size(row, size)).collect();
+        let all = scaled_rows(&rows, &sizes, size);
+        let mut chosen: Vec<usize> = Vec::new();
+        for i in 0..rows.len() {
+            let mut candidate = chosen.clone();
+            candidate.push(i);
+            if rank(&all.select_rows(&candidate)) == candidate.len() {
+                chosen = candidate;
+            }
+        }
+        chosen
+    };
+    let mut best: Vec<usize> = Vec::new();
+    for pose in poses {
+        let chosen = choose(pose);
+        if chosen.len() > best.len() {
+            best = chosen;
+        }
+    }
+    best
+}
+
+fn rank(m: &DMatrix<f64>) -> usize {
+    if m.nrows() == 0 {
+        return 0;
+    }
+    let values = m.singular_values();
+    let floor = values.max() * RANK_TOLERANCE;
+    values.iter().filter(|&&s| s > floor).count()
+}
+
+struct Closure {
+    rank: usize,
+    redundant_legs: Vec<usize>,
+    passive_legs: Vec<usize>,
+}
+
+/// Loop closures at a pose: for each leg, the twists of its joints add up to the platform's. Unknown are all joint
+/// rates and the platform's twist; a rod's turning is one unknown for all legs that it carries.
+fn closure(mech: &Mechanism, pose: &Pose<f64>) -> Closure {
+    let size = mech.characteristic_length;
+    let legs: Vec<Vec<Screw>> = mech.legs.iter().map(|leg| leg_screws(leg, pose)).collect();
+    let own: usize = legs.iter().map(Vec::len).sum();
+    let columns = mech.rods.len() + own + 6;
+    let mut m = DMatrix::zeros(6 * legs.len(), columns);
+    let put = |m: &mut DMatrix<f64>, leg: usize, column: usize, screw: &Screw| {
+        let (linear, angular) = (screw.linear.map(|c| c / size).array(), screw.angular.array());
+        for i in 0..3 {
+            m[(6 * leg + i, column)] = linear[i];
+            m[(6 * leg + 3 + i, column)] = angular[i];
+        }
+    };
+    let mut column = mech.rods.len();
+    let mut passive_legs = Vec::new();
+    for (i, screws) in legs.iter().enumerate() {
+        let first = column;
+        for screw in screws {
+            put(&mut m, i, column, screw);
+            column += 1;
+        }
+        if rank(&m.view((6 * i, first), (6, screws.len())).into_owned()) < screws.len() {
+            passive_legs.push(i);
+        }
+        if let Some(rod) = mech.legs[i].rod {
+            put(
+                &mut m,
+                i,
+                rod,
+                &Screw::turn(mech.rods[rod].axis, mech.rods[rod].point - pose.o),
+            );
+        }
+        for k in 0..6 {
+            m[(6 * i + k, own + mech.rods.len() + k)] = -1.0;
+        }
+    }
+    // Left null vectors are sets of leg wrenches, each unfelt by its own joints, that cancel on the platform.
+    let svd = m.svd(true, false);
+    let floor = svd.singular_values.max() * RANK_TOLERANCE;
+    let rank = svd.singular_values.iter().filter(|&&s| s > floor).count();
+    let span = svd.u.map(|u| u.columns(0, rank).into_owned());
+    let felt = |row: usize| span.as_ref().map_or(1.0, |u| u.row(row).norm_squared());
+    let redundant_legs = (0..legs.len())
+        .filter(|&leg| (0..6).any(|k| 1.0 - felt(6 * leg + k) > 1e-6))
+        .collect();
+    Closure {
+        rank,
+        redundant_legs,
+        passive_legs,
+    }
+}
+
+/// The twist of a unit joint rate, at o.
+struct Screw {
+    linear: Vec3<f64>,
+    angular: Vec3<f64>,
+}
+
+impl Screw {
+    /// A turn about a line through o + point.
+    fn turn(axis: Vec3<f64>, point: Vec3<f64>) -> Self {
+        Screw {
+            linear: point.cross(axis),
+            angular: axis,
+        }
+    }
+}
+
+/// Joint twists of a leg without its rod: base joint, prismatic, platform joint.
+fn leg_screws(leg: &Leg, pose: &Pose<f64>) -> Vec<Screw> {
+    let p = leg::position(leg, pose);
+    let n = leg::frame(leg, pose, &p).n();
+    let below = leg.base.point - pose.o;
+    let (base, platform) = (
+        leg.base.axis.unwrap_or(n),
+        leg.platform.axis.map_or(n, |a| pose.rotation * a),
+    );
+    let turns = |kind: JointKind, axis: Vec3<f64>| match kind {
+        JointKind::Spherical => vec![Vec3::X, Vec3::Y, Vec3::Z],
+        JointKind::Universal => vec![axis, n],
+        JointKind::Revolute => vec![axis],
+        JointKind::Fixed => vec![],
+    };
+    let mut base_turns = turns(leg.base.kind, base);
+    if leg.rod.is_some() {
+        // The rod's own turning is shared with its other legs; what is left is R about n.
+        base_turns.remove(0);
+    }
+    let mut screws: Vec<Screw> = base_turns.into_iter().map(|a| Screw::turn(a, below)).collect();
+    screws.push(Screw {
+        linear: p.delta * p.length,
+        angular: Vec3::zero(),
+    });
+    screws.extend(
+        turns(leg.platform.kind, platform)
+            .into_iter()
+            .map(|a| Screw::turn(a, p.e)),
+    );
+    screws
+}
+
+/// Links and joints as a graph: the base, the platform, rods, cylinders and pistons. A fixed joint makes one link of two.
+fn graph(mech: &Mechanism) -> Graph {
+    let mut names: Vec<String> = vec!["base".into(), "platform".into()];
+    let mut joints: Vec<GraphJoint> = Vec::new();
+    let mut rods = Vec::new();
+    for rod in &mech.rods {
+        rods.push(names.len());
+        joints.push(GraphJoint {
+            kind: "R",
+            name: format!("rod {}", rod.name),
+            links: [0, names.len()],
+        });
+        names.push(format!("rod {}", rod.name));
+    }
+    for leg in &mech.legs {
+        let mut link = |kind: JointKind, body: usize, name: &str| {
+            if kind == JointKind::Fixed {
+                return body;
+            }
+            names.push(format!("{name} {}", leg.name));
+            names.len() - 1
+        };
+        let ground = leg.rod.map_or(0, |rod| rods[rod]);
+        let (cylinder, piston) = (
+            link(leg.base.kind, 0, "cylinder"),
+            link(leg.platform.kind, 1, "piston"),
+        );
+        let below = if leg.rod.is_some() {
+            JointKind::Revolute
+        } else {
+            leg.base.kind
+        };
+        let mut join = |kind: &'static str, place: &str, links| {
+            joints.push(GraphJoint {
+                kind,
+                name: format!("{place} {}", leg.name),
+                links,
+            });
+        };
+        if below != JointKind::Fixed {
+            join(below.letter(), "base joint", [ground, cylinder]);
+        }
+        join("P", "prismatic", [cylinder, piston]);
+        if leg.platform.kind != JointKind::Fixed {
+            join(leg.platform.kind.letter(), "platform joint", [piston, 1]);
+        }
+    }
+    let links = names.into_iter().enumerate().map(|(i, name)| {
+        let on = joints
+            .iter()
+            .enumerate()
+            .filter(|(_, j)| j.links.contains(&i))
+            .map(|(k, _)| k);
+        GraphLink {
+            joints: on.collect(),
+            name,
+        }
+    });
+    Graph {
+        links: links.collect(),
+        joints,
+    }
+}
+
+/// The two legs of a rod that carry one constraint together, with its axes in base and platform.
+#[must_use]
+pub fn coupled_pair(mech: &Mechanism) -> Option<([usize; 2], Vec3<f64>, Vec3<f64>)> {
+    mech.rods.iter().enumerate().find_map(|(r, rod)| {
+        let on: Vec<usize> = (0..mech.legs.len())
+            .filter(|&i| mech.legs[i].rod == Some(r))
+            .collect();
+        let &[first, second] = on.as_slice() else {
+            return None;
+        };
+        let axis = |i: usize| match (mech.legs[i].turning, mech.legs[i].platform.kind) {
+            (Turning::Across(Side::Base, _), JointKind::Universal) => mech.legs[i].platform.axis,
+            _ => None,
+        };
+        let (a, b) = (axis(first)?, axis(second)?);
+        let line = mech.legs[first].platform.point - mech.legs[second].platform.point;
+        let parallel = |u: Vec3<f64>, v: Vec3<f64>| u.cross(v).norm() <= 1e-9 * u.norm() * v.norm();
+        (parallel(a, b) && parallel(a, line)).then_some(([first, second], rod.axis, a))
+    })
+}

@@ -1,0 +1,387 @@
+//! Three-vectors, rotations, poses, twists, accelerations and wrenches, over any [`Real`].
+//!
+//! Six-vectors have their linear part first and are taken at the platform's point o, in base axes.
+//! An acceleration is the classical one: its linear part is the acceleration of the point o.
+
+use std::ops::{Add, Mul, Neg, Sub};
+
+use serde::{Deserialize, Serialize};
+
+use crate::real::Real;
+
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(from = "[T; 3]", into = "[T; 3]")]
+#[serde(bound(serialize = "T: Copy + Serialize", deserialize = "T: Deserialize<'de>"))]
+pub struct Vec3<T> {
+    pub x: T,
+    pub y: T,
+    pub z: T,
+}
+
+impl<T> From<[T; 3]> for Vec3<T> {
+    fn from([x, y, z]: [T; 3]) -> Self {
+        Vec3 { x, y, z }
+    }
+}
+
+impl<T> From<Vec3<T>> for [T; 3] {
+    fn from(a: Vec3<T>) -> Self {
+        [a.x, a.y, a.z]
+    }
+}
+
+impl<T: Real> Vec3<T> {
+    #[inline(always)]
+    pub fn new(x: T, y: T, z: T) -> Self {
+        Vec3 { x, y, z }
+    }
+
+    #[must_use]
+    #[inline(always)]
+    pub fn zero() -> Self {
+        Vec3::new(T::zero(), T::zero(), T::zero())
+    }
+
+    /// A constant of the mechanism as a vector of the kernel's number.
+    #[inline(always)]
+    pub fn lift(a: Vec3<f64>) -> Self {
+        Vec3::new(T::lit(a.x), T::lit(a.y), T::lit(a.z))
+    }
+
+    #[inline(always)]
+    pub fn dot(self, b: Self) -> T {
+        self.x.mul_add(b.x, self.y.mul_add(b.y, self.z * b.z))
+    }
+
+    #[must_use]
+    #[inline(always)]
+    pub fn cross(self, b: Self) -> Self {
+        Vec3::new(
+            self.y.mul_add(b.z, -(self.z * b.y)),
+            self.z.mul_add(b.x, -(self.x * b.z)),
+            self.x.mul_add(b.y, -(self.y * b.x)),
+        )
+    }
+
+    #[inline(always)]
+    pub fn norm(self) -> T {
+        self.dot(self).sqrt()
+    }
+
+    #[must_use]
+    #[inline(always)]
+    pub fn unit(self) -> Self {
+        self * (T::one() / self.norm())
+    }
+
+    #[inline(always)]
+    pub fn map<U>(self, f: impl Fn(T) -> U) -> Vec3<U> {
+        Vec3 {
+            x: f(self.x),
+            y: f(self.y),
+            z: f(self.z),
+        }
+    }
+
+    #[inline(always)]
+    pub fn array(self) -> [T; 3] {
+        self.into()
+    }
+}
+
+impl Vec3<f64> {
+    pub const X: Self = Vec3 {
+        x: 1.0,
+        y: 0.0,
+        z: 0.0,
+    };
+    pub const Y: Self = Vec3 {
+        x: 0.0,
+        y: 1.0,
+        z: 0.0,
+    };
+    pub const Z: Self = Vec3 {
+        x: 0.0,
+        y: 0.0,
+        z: 1.0,
+    };
+
+    /// A unit vector square to this one, on the side of the base axis that this one leans on least.
+    #[must_use]
+    pub fn perpendicular(self) -> Self {
+        let [x, y, z] = self.map(f64::abs).array();
+        let axis = if z <= x && z <= y {
+            Vec3::Z
+        } else if y <= x {
+            Vec3::Y
+        } else {
+            Vec3::X
+        };
+        self.cross(axis).cross(self).unit()
+    }
+}
+
+impl<T: Real> Add for Vec3<T> {
+    type Output = Self;
+    #[inline(always)]
+    fn add(self, b: Self) -> Self {
+        Vec3::new(self.x + b.x, self.y + b.y, self.z + b.z)
+    }
+}
+
+impl<T: Real> Sub for Vec3<T> {
+    type Output = Self;
+    #[inline(always)]
+    fn sub(self, b: Self) -> Self {
+        Vec3::new(self.x - b.x, self.y - b.y, self.z - b.z)
+    }
+}
+
+impl<T: Real> Neg for Vec3<T> {
+    type Output = Self;
+    #[inline(always)]
+    fn neg(self) -> Self {
+        Vec3::new(-self.x, -self.y, -self.z)
+    }
+}
+
+impl<T: Real> Mul<T> for Vec3<T> {
+    type Output = Self;
+    #[inline(always)]
+    fn mul(self, k: T) -> Self {
+        Vec3::new(self.x * k, self.y * k, self.z * k)
+    }
+}
+
+/// A matrix by its columns.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Mat3<T>(pub [Vec3<T>; 3]);
+
+impl<T: Real> Mat3<T> {
+    #[inline(always)]
+    pub fn from_columns(a: Vec3<T>, b: Vec3<T>, c: Vec3<T>) -> Self {
+        Mat3([a, b, c])
+    }
+
+    #[inline(always)]
+    pub fn from_rows(m: [[T; 3]; 3]) -> Self {
+        Mat3([0, 1, 2].map(|j| Vec3::new(m[0][j], m[1][j], m[2][j])))
+    }
+
+    pub fn rows(self) -> [[T; 3]; 3] {
+        self.transpose().0.map(Vec3::array)
+    }
+
+    #[must_use]
+    #[inline(always)]
+    pub fn identity() -> Self {
+        Mat3::lift(Mat3([Vec3::X, Vec3::Y, Vec3::Z]))
+    }
+
+    #[inline(always)]
+    pub fn lift(m: Mat3<f64>) -> Self {
+        Mat3(m.0.map(Vec3::lift))
+    }
+
+    #[must_use]
+    #[inline(always)]
+    pub fn transpose(self) -> Self {
+        let [a, b, c] = self.0;
+        Mat3([
+            Vec3::new(a.x, b.x, c.x),
+            Vec3::new(a.y, b.y, c.y),
+            Vec3::new(a.z, b.z, c.z),
+        ])
+    }
+
+    /// `Mᵀ a`.
+    #[inline(always)]
+    pub fn transpose_mul(self, a: Vec3<T>) -> Vec3<T> {
+        let [x, y, z] = self.0;
+        Vec3::new(x.dot(a), y.dot(a), z.dot(a))
+    }
+
+    /// Turn by `angle`, given as its sine and cosine, about x.
+    #[inline(always)]
+    pub fn rotation_x((s, c): (T, T)) -> Self {
+        let (i, o) = (T::one(), T::zero());
+        Mat3::from_rows([[i, o, o], [o, c, -s], [o, s, c]])
+    }
+
+    /// Turn about y.
+    #[inline(always)]
+    pub fn rotation_y((s, c): (T, T)) -> Self {
+        let (i, o) = (T::one(), T::zero());
+        Mat3::from_rows([[c, o, s], [o, i, o], [-s, o, c]])
+    }
+
+    /// Turn about z.
+    #[inline(always)]
+    pub fn rotation_z((s, c): (T, T)) -> Self {
+        let (i, o) = (T::one(), T::zero());
+        Mat3::from_rows([[c, -s, o], [s, c, o], [o, o, i]])
+    }
+
+    /// The shortest turn that takes the unit vector `a` to the unit vector `b`; undefined for `b = -a`.
+    #[inline(always)]
+    pub fn shortest_turn(a: Vec3<T>, b: Vec3<T>) -> Self {
+        let w = a.cross(b);
+        let k = T::one() / (T::one() + a.dot(b));
+        // 1 + [w] + [w]² / (1 + a·b)
+        let column = |e: Vec3<T>| {
+            let we = w.cross(e);
+            e + we + w.cross(we) * k
+        };
+        Mat3(Mat3::identity().0.map(column))
+    }
+}
+
+impl Mat3<f64> {
+    /// Rodrigues' formula for the turn by |w| about w.
+    #[must_use]
+    pub fn from_rotation_vector(w: Vec3<f64>) -> Self {
+        let angle = w.norm();
+        if angle == 0.0 {
+            return Mat3::identity();
+        }
+        let axis = w * (1.0 / angle);
+        let (s, c) = angle.sin_cos();
+        Mat3(
+            Mat3::identity()
+                .0
+                .map(|e: Vec3<f64>| e * c + axis.cross(e) * s + axis * (axis.dot(e) * (1.0 - c))),
+        )
+    }
+
+    /// How far from a rotation: the largest entry of `MᵀM - 1`, or infinity for a mirror image.
+    #[must_use]
+    pub fn rotation_error(self) -> f64 {
+        let [a, b, c] = self.0;
+        let products = [
+            a.dot(a) - 1.0,
+            b.dot(b) - 1.0,
+            c.dot(c) - 1.0,
+            a.dot(b),
+            b.dot(c),
+            c.dot(a),
+        ]
+        .map(f64::abs);
+        if a.cross(b).dot(c) <= 0.0 {
+            return f64::INFINITY;
+        }
+        products
+            .into_iter()
+            .fold(0.0, |m, e| if e > m || e.is_nan() { e } else { m })
+    }
+}
+
+impl<T: Real> Mul<Vec3<T>> for Mat3<T> {
+    type Output = Vec3<T>;
+    #[inline(always)]
+    fn mul(self, a: Vec3<T>) -> Vec3<T> {
+        self.0[0] * a.x + self.0[1] * a.y + self.0[2] * a.z
+    }
+}
+
+impl<T: Real> Mul for Mat3<T> {
+    type Output = Self;
+    #[inline(always)]
+    fn mul(self, b: Self) -> Self {
+        Mat3(b.0.map(|column| self * column))
+    }
+}
+
+/// The platform's place: platform axes to base axes, and the point o.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pose<T> {
+    pub rotation: Mat3<T>,
+    pub o: Vec3<T>,
+}
+
+impl<T: Real> Pose<T> {
+    #[inline(always)]
+    pub fn lift(p: &Pose<f64>) -> Self {
+        Pose {
+            rotation: Mat3::lift(p.rotation),
+            o: Vec3::lift(p.o),
+        }
+    }
+}
+
+/// (v, ω) of the platform at o.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Twist<T> {
+    pub v: Vec3<T>,
+    pub omega: Vec3<T>,
+}
+
+/// (a, ε) of the platform at o.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Acceleration<T> {
+    pub a: Vec3<T>,
+    pub eps: Vec3<T>,
+}
+
+/// (F, T) on the platform at o; also a row of the Jacobian, whose product with the twist is a power or a rate.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Wrench<T> {
+    pub force: Vec3<T>,
+    pub torque: Vec3<T>,
+}
+
+macro_rules! six_vector {
+    ($name:ident, $linear:ident, $angular:ident) => {
+        impl<T: Real> $name<T> {
+            #[inline(always)]
+            pub fn new($linear: Vec3<T>, $angular: Vec3<T>) -> Self {
+                $name { $linear, $angular }
+            }
+            #[must_use]
+            #[inline(always)]
+            pub fn zero() -> Self {
+                $name::new(Vec3::zero(), Vec3::zero())
+            }
+            #[inline(always)]
+            pub fn from_array([a, b, c, d, e, f]: [T; 6]) -> Self {
+                $name::new(Vec3::new(a, b, c), Vec3::new(d, e, f))
+            }
+            #[inline(always)]
+            pub fn array(self) -> [T; 6] {
+                let ([a, b, c], [d, e, f]) = (self.$linear.array(), self.$angular.array());
+                [a, b, c, d, e, f]
+            }
+        }
+    };
+}
+six_vector!(Twist, v, omega);
+six_vector!(Acceleration, a, eps);
+six_vector!(Wrench, force, torque);
+
+impl<T: Real> Wrench<T> {
+    /// A force at the point o + e.
+    #[inline(always)]
+    pub fn at(e: Vec3<T>, force: Vec3<T>) -> Self {
+        Wrench::new(force, e.cross(force))
+    }
+
+    #[inline(always)]
+    pub fn power(self, twist: &Twist<T>) -> T {
+        self.force.dot(twist.v) + self.torque.dot(twist.omega)
+    }
+}
+
+impl<T: Real> Add for Wrench<T> {
+    type Output = Self;
+    #[inline(always)]
+    fn add(self, b: Self) -> Self {
+        Wrench::new(self.force + b.force, self.torque + b.torque)
+    }
+}
+
+impl<T: Real> Mul<T> for Wrench<T> {
+    type Output = Self;
+    #[inline(always)]
+    fn mul(self, k: T) -> Self {
+        Wrench::new(self.force * k, self.torque * k)
+    }
+}

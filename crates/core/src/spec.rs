@@ -1,0 +1,412 @@
+//! The mechanism as it is described from outside: plain data in SI units, parts that could not be read left out.
+//! [`Spec::check`] finds every fault that one part shows by itself; what parts must be to each other is
+//! checked where the [`Mechanism`](crate::mechanism::Mechanism) is made from them.
+
+use serde::Deserialize;
+
+use crate::spatial::{Mat3, Vec3};
+
+/// What is wrong, and where: `legs.3.stroke` counts from 1, as the file does.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Fault {
+    pub place: String,
+    pub message: String,
+}
+
+impl Fault {
+    pub fn new(place: impl Into<String>, message: impl Into<String>) -> Self {
+        Fault {
+            place: place.into(),
+            message: message.into(),
+        }
+    }
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+pub enum JointKind {
+    #[serde(rename = "S")]
+    Spherical,
+    #[serde(rename = "U")]
+    Universal,
+    #[serde(rename = "R")]
+    Revolute,
+    #[serde(rename = "F")]
+    Fixed,
+}
+
+impl JointKind {
+    #[must_use]
+    pub fn freedoms(self) -> usize {
+        match self {
+            JointKind::Spherical => 3,
+            JointKind::Universal => 2,
+            JointKind::Revolute => 1,
+            JointKind::Fixed => 0,
+        }
+    }
+
+    #[must_use]
+    pub fn letter(self) -> &'static str {
+        match self {
+            JointKind::Spherical => "S",
+            JointKind::Universal => "U",
+            JointKind::Revolute => "R",
+            JointKind::Fixed => "F",
+        }
+    }
+}
+
+/// Largest angle between the leg and `axis` (body axes; the leg's direction at home when absent).
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ConeSpec {
+    pub angle: f64,
+    pub axis: Option<Vec3<f64>>,
+}
+
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct JointSpec {
+    pub joint: JointKind,
+    pub point: Vec3<f64>,
+    pub axis: Option<Vec3<f64>>,
+    pub normal: Option<Vec3<f64>>,
+    pub rod: Option<usize>,
+    pub cone: Option<ConeSpec>,
+}
+
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct BodySpec {
+    pub mass: f64,
+    pub center: Vec3<f64>,
+    /// About the mass centre, rows.
+    pub inertia: [[f64; 3]; 3],
+}
+
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LegSpec {
+    pub name: String,
+    pub actuated: bool,
+    pub stroke: Option<[f64; 2]>,
+    pub radius: Option<f64>,
+    pub base: JointSpec,
+    pub platform: JointSpec,
+    pub cylinder: Option<BodySpec>,
+    pub piston: Option<BodySpec>,
+}
+
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RodSpec {
+    pub name: String,
+    pub point: Vec3<f64>,
+    pub axis: Vec3<f64>,
+    pub body: Option<BodySpec>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Axes {
+    Base,
+    Platform,
+}
+
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LoadSpec {
+    pub force: Vec3<f64>,
+    pub torque: Vec3<f64>,
+    pub axes: Axes,
+}
+
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct HomeSpec {
+    pub position: Vec3<f64>,
+    pub rotation_vector: Vec3<f64>,
+}
+
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ToolSpec {
+    pub point: Vec3<f64>,
+    pub axis: Vec3<f64>,
+}
+
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Spec {
+    pub name: String,
+    pub legs: Vec<Option<LegSpec>>,
+    pub rods: Vec<Option<RodSpec>>,
+    pub platform: Option<BodySpec>,
+    pub gravity: Vec3<f64>,
+    pub efficiency: f64,
+    pub linear_damping: f64,
+    pub angular_damping: f64,
+    pub load: LoadSpec,
+    pub home: Option<HomeSpec>,
+    pub tool: ToolSpec,
+}
+
+impl Spec {
+    /// # Errors
+    /// The one fault that keeps the text from being read as a spec at all.
+    pub fn from_json(text: &str) -> Result<Self, Vec<Fault>> {
+        serde_json::from_str(text).map_err(|e| vec![Fault::new("mechanism", e.to_string())])
+    }
+
+    /// Every fault that a part shows by itself.
+    #[must_use]
+    pub fn check(&self) -> Vec<Fault> {
+        let mut faults = Faults::default();
+        if self.legs.is_empty() {
+            faults.add("legs", "there is none; a mechanism needs at least one leg");
+        }
+        faults.finite3("dynamics.gravity", self.gravity);
+        if !(self.efficiency > 0.0 && self.efficiency <= 1.0) {
+            faults.add(
+                "dynamics.efficiency",
+                format!("is {}; must be above 0 and at most 1", self.efficiency),
+            );
+        }
+        for (place, mu) in [("linear", self.linear_damping), ("angular", self.angular_damping)] {
+            if !(mu >= 0.0 && mu.is_finite()) {
+                faults.add(
+                    format!("dynamics.{place}_damping"),
+                    format!("is {mu}; must be zero or positive"),
+                );
+            }
+        }
+        faults.finite3("load.force", self.load.force);
+        faults.finite3("load.torque", self.load.torque);
+        faults.finite3("tool.point", self.tool.point);
+        faults.axis("tool.axis", self.tool.axis);
+        if let Some(home) = &self.home {
+            faults.finite3("home.position", home.position);
+            faults.finite3("home.rotation_vector", home.rotation_vector);
+        }
+        faults.body("platform", self.platform.as_ref());
+        for (i, rod) in self.rods.iter().enumerate() {
+            let Some(rod) = rod else { continue };
+            let place = format!("rods.{}", i + 1);
+            faults.finite3(&format!("{place}.point"), rod.point);
+            faults.axis(&format!("{place}.axis"), rod.axis);
+            faults.body(&place, rod.body.as_ref());
+        }
+        for (i, leg) in self.legs.iter().enumerate() {
+            let Some(leg) = leg else { continue };
+            faults.leg(&format!("legs.{}", i + 1), leg, self.rods.len());
+        }
+        faults.same_names("legs", self.legs.iter().flatten().map(|leg| leg.name.as_str()));
+        faults.same_names("rods", self.rods.iter().flatten().map(|rod| rod.name.as_str()));
+        faults.0
+    }
+}
+
+/// The list of faults while it grows.
+#[derive(Default)]
+struct Faults(Vec<Fault>);
+
+impl Faults {
+    fn add(&mut self, place: impl Into<String>, message: impl Into<String>) {
+        self.0.push(Fault::new(place, message));
+    }
+
+    fn finite3(&mut self, place: &str, a: Vec3<f64>) -> bool {
+        let finite = a.array().iter().all(|c| c.is_finite());
+        if !finite {
+            self.add(
+                place,
+                format!("is {:?}; each component must be a finite number", a.array()),
+            );
+        }
+        finite
+    }
+
+    fn axis(&mut self, place: &str, a: Vec3<f64>) {
+        if self.finite3(place, a) && a.norm() == 0.0 {
+            self.add(place, "is zero; an axis needs a direction");
+        }
+    }
+
+    fn leg(&mut self, place: &str, leg: &LegSpec, rods: usize) {
+        for (side, joint) in [("base", &leg.base), ("platform", &leg.platform)] {
+            self.joint(&format!("{place}.{side}"), joint, rods);
+        }
+        if leg.platform.rod.is_some() {
+            self.add(format!("{place}.platform.rod"), "a rod carries base joints only");
+        }
+        if let Some([min, max]) = leg.stroke
+            && !(min >= 0.0 && min < max && max.is_finite())
+        {
+            self.add(
+                format!("{place}.stroke"),
+                format!("min is {min} m, max is {max} m; needs 0 <= min < max"),
+            );
+        }
+        if let Some(radius) = leg.radius
+            && !(radius > 0.0 && radius.is_finite())
+        {
+            self.add(
+                format!("{place}.radius"),
+                format!("is {radius} m; must be positive"),
+            );
+        }
+        self.body(&format!("{place}.cylinder"), leg.cylinder.as_ref());
+        self.body(&format!("{place}.piston"), leg.piston.as_ref());
+        if leg.base.joint == JointKind::Spherical && leg.platform.joint == JointKind::Spherical {
+            for (part, body) in [("cylinder", &leg.cylinder), ("piston", &leg.piston)] {
+                if body.as_ref().is_some_and(|b| !symmetric_about_leg(b)) {
+                    self.add(
+                        format!("{place}.{part}"),
+                        "a leg with S at both ends spins freely, so its bodies must be symmetric about the leg: mass \
+                         centre on it, inertia [[a, 0, 0], [0, b, 0], [0, 0, a]]",
+                    );
+                }
+            }
+        }
+    }
+
+    fn joint(&mut self, place: &str, joint: &JointSpec, rods: usize) {
+        self.finite3(&format!("{place}.point"), joint.point);
+        for (key, axis) in [("axis", joint.axis), ("normal", joint.normal)] {
+            if let Some(axis) = axis {
+                self.axis(&format!("{place}.{key}"), axis);
+            }
+        }
+        let (axis, normal) = match (joint.joint, joint.rod) {
+            (JointKind::Spherical, _) | (JointKind::Revolute, Some(_)) => (false, false),
+            (JointKind::Universal, _) | (JointKind::Revolute, None) => (true, false),
+            (JointKind::Fixed, _) => (true, true),
+        };
+        for (key, needed, given) in [
+            ("axis", axis, joint.axis.is_some()),
+            ("normal", normal, joint.normal.is_some()),
+        ] {
+            if needed && !given {
+                self.add(
+                    format!("{place}.{key}"),
+                    format!("is missing; a {} joint needs it", joint.joint.letter()),
+                );
+            }
+        }
+        if let Some(rod) = joint.rod {
+            if joint.joint != JointKind::Revolute {
+                self.add(
+                    format!("{place}.joint"),
+                    format!("is {}; on a rod it must be R", joint.joint.letter()),
+                );
+            }
+            if rod >= rods {
+                self.add(format!("{place}.rod"), "names no rod of this mechanism");
+            }
+        }
+        if let (JointKind::Fixed, Some(axis), Some(normal)) = (joint.joint, joint.axis, joint.normal)
+            && axis.dot(normal).abs() > ANGLE_TOLERANCE * axis.norm() * normal.norm()
+        {
+            self.add(format!("{place}.normal"), "must be square to the axis");
+        }
+        if let Some(cone) = &joint.cone {
+            if !(cone.angle > 0.0 && cone.angle <= std::f64::consts::PI) {
+                self.add(
+                    format!("{place}.cone.angle"),
+                    format!("is {} rad; must be above 0 and at most pi", cone.angle),
+                );
+            }
+            if let Some(axis) = cone.axis {
+                self.axis(&format!("{place}.cone.axis"), axis);
+            }
+        }
+    }
+
+    fn body(&mut self, place: &str, body: Option<&BodySpec>) {
+        let Some(body) = body else { return };
+        self.finite3(&format!("{place}.center"), body.center);
+        if !(body.mass > 0.0 && body.mass.is_finite()) {
+            self.add(
+                format!("{place}.mass"),
+                format!(
+                    "is {} kg; must be positive (leave the body out to have none)",
+                    body.mass
+                ),
+            );
+        }
+        if let Some(message) = inertia_fault(&body.inertia) {
+            self.add(format!("{place}.inertia"), message);
+        }
+    }
+
+    fn same_names<'a>(&mut self, place: &str, names: impl Iterator<Item = &'a str>) {
+        let mut seen = Vec::new();
+        for name in names {
+            if seen.contains(&name) {
+                self.add(
+                    place,
+                    format!("the name \"{name}\" stands twice; each needs its own"),
+                );
+            }
+            seen.push(name);
+        }
+    }
+}
+
+/// Sine of the largest angle by which axes given in a file may miss their relation.
+pub const ANGLE_TOLERANCE: f64 = 1e-6;
+
+/// Relative slack for inertias, which files give with few digits.
+const INERTIA_TOLERANCE: f64 = 1e-9;
+
+fn symmetric_about_leg(body: &BodySpec) -> bool {
+    let i = &body.inertia;
+    let slack = INERTIA_TOLERANCE * (i[0][0] + i[1][1] + i[2][2]);
+    let off = [
+        i[0][1],
+        i[0][2],
+        i[1][2],
+        i[1][0],
+        i[2][0],
+        i[2][1],
+        i[0][0] - i[2][2],
+    ];
+    body.center.x == 0.0 && body.center.z == 0.0 && off.iter().all(|e| e.abs() <= slack)
+}
+
+fn inertia_fault(rows: &[[f64; 3]; 3]) -> Option<String> {
+    if rows.iter().flatten().any(|e| !e.is_finite()) {
+        return Some("holds a value that is not a finite number".into());
+    }
+    let scale = rows.iter().flatten().fold(0.0_f64, |m, e| m.max(e.abs()));
+    let transposed = Mat3::from_rows(*rows).transpose().rows();
+    let skew = rows
+        .iter()
+        .flatten()
+        .zip(transposed.iter().flatten())
+        .any(|(a, b)| (a - b).abs() > INERTIA_TOLERANCE * scale);
+    if skew {
+        return Some("is not symmetric; the inertia matrix equals its transpose".into());
+    }
+    let mut principal: Vec<f64> = nalgebra::Matrix3::from_fn(|i, j| rows[i][j])
+        .symmetric_eigenvalues()
+        .iter()
+        .copied()
+        .collect();
+    principal.sort_by(f64::total_cmp);
+    let shown = format!(
+        "[{:.6e}, {:.6e}, {:.6e}] kg m^2",
+        principal[0], principal[1], principal[2]
+    );
+    if principal[0] <= 0.0 {
+        return Some(format!(
+            "is not positive definite: its principal moments are {shown}"
+        ));
+    }
+    if principal[0] + principal[1] < principal[2] * (1.0 - INERTIA_TOLERANCE) {
+        return Some(format!(
+            "belongs to no body: of its principal moments {shown} the largest exceeds the sum of the others"
+        ));
+    }
+    None
+}

@@ -1,0 +1,67 @@
+//! The outcome of one state of a batch.
+
+/// Small integers, the same in Python.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+#[repr(u8)]
+pub enum Status {
+    #[default]
+    Ok = 0,
+    /// The coordinates have no pose: |cos γ| > 1 [Eq. 5].
+    NoBranch = 1,
+    /// The coordinates are singular: two branches meet, rates are not determined.
+    Fold = 2,
+    /// The iteration for the dependent coordinates did not converge.
+    NotConverged = 3,
+    /// The Jacobian is singular to working precision.
+    Singular = 4,
+    /// A leg is longer or shorter than its stroke allows; the numbers stand.
+    OutOfStroke = 5,
+    /// The pose, twist or acceleration breaks a constraint of the mechanism.
+    OffConstraint = 6,
+    /// Not a number, infinite, or not a pose.
+    InvalidInput = 7,
+}
+
+impl Status {
+    pub const ALL: [Status; 8] = [
+        Status::Ok,
+        Status::NoBranch,
+        Status::Fold,
+        Status::NotConverged,
+        Status::Singular,
+        Status::OutOfStroke,
+        Status::OffConstraint,
+        Status::InvalidInput,
+    ];
+
+    /// What it means and what helps.
+    #[must_use]
+    pub fn message(self) -> &'static str {
+        match self {
+            Status::Ok => "ok",
+            Status::NoBranch => {
+                "no pose has these coordinates: the constraint leaves no real dependent coordinate (|cos γ| > 1, Eq. 5); \
+                 change them together, or use natural coordinates"
+            }
+            Status::Fold => {
+                "the coordinates are singular here: two branches meet (γ = 0 or 180°), so rates are not determined; \
+                 the mechanism need not be singular, natural coordinates may pass"
+            }
+            Status::NotConverged => {
+                "no pose was found from the guess; give a guess nearer to the pose or check that it exists"
+            }
+            Status::Singular => {
+                "the Jacobian is singular to working precision: forces or velocities are not determined at this pose"
+            }
+            Status::OutOfStroke => {
+                "a leg is outside its stroke; the numbers stand, the machine cannot reach the pose"
+            }
+            Status::OffConstraint => {
+                "the pose, twist or acceleration breaks a constraint of the mechanism; make it with mech.state(...)"
+            }
+            Status::InvalidInput => {
+                "the input holds NaN or infinity, or its rotation is not a rotation matrix"
+            }
+        }
+    }
+}

@@ -1,0 +1,333 @@
+//! Arrays in, arrays out: the bindings of `polypod-core`. No mathematics here; shapes and names are the caller's.
+
+use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray1};
+use polypod_core::batch::{self, Coordinates, Loads, States, Table};
+use polypod_core::coordinates::Set;
+use polypod_core::mechanism::Mechanism;
+use polypod_core::spec::{Axes, Fault, Spec};
+use polypod_core::status::Status;
+use pyo3::exceptions::{PyKeyError, PyValueError};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+pyo3::create_exception!(
+    _core,
+    Faults,
+    pyo3::exceptions::PyException,
+    "All faults of a mechanism as (place, message)."
+);
+
+type Array<'py> = PyReadonlyArray1<'py, f64>;
+
+/// The one place where errors of the core become errors of Python.
+fn raise(faults: Vec<Fault>) -> PyErr {
+    Faults::new_err((faults
+        .into_iter()
+        .map(|f| (f.place, f.message))
+        .collect::<Vec<_>>(),))
+}
+
+fn slice<'a>(array: &'a Array<'_>) -> PyResult<&'a [f64]> {
+    array
+        .as_slice()
+        .map_err(|_| PyValueError::new_err("needs a contiguous array"))
+}
+
+/// `len(poses) / 16` states; every other array must fit them.
+fn expect(array: &[f64], width: usize, poses: &[f64]) -> PyResult<()> {
+    if !poses.len().is_multiple_of(16) || array.len() != poses.len() / 16 * width {
+        return Err(PyValueError::new_err("arrays do not have one row for each pose"));
+    }
+    Ok(())
+}
+
+/// Arrays by name, the states along the first axis, and their status.
+fn arrays(py: Python<'_>, table: Table) -> PyResult<Bound<'_, PyDict>> {
+    let result = PyDict::new(py);
+    let states = table.status.len();
+    for field in table.fields {
+        let shape: Vec<usize> = std::iter::once(states).chain(field.shape).collect();
+        result.set_item(field.name, PyArray1::from_vec(py, field.data).reshape(shape)?)?;
+    }
+    let status: Vec<u8> = table.status.iter().map(|&s| s as u8).collect();
+    result.set_item("status", PyArray1::from_vec(py, status))?;
+    Ok(result)
+}
+
+#[pyclass(name = "Mechanism", frozen)]
+struct PyMechanism(Mechanism);
+
+impl PyMechanism {
+    fn set(&self, name: &str) -> PyResult<Set> {
+        let sets = Set::of(&self.0);
+        sets.into_iter()
+            .find(|s| s.name() == name)
+            .ok_or_else(|| PyKeyError::new_err(name.to_owned()))
+    }
+}
+
+fn loads<'a>(wrench: Option<&'a Array<'_>>, platform_axes: bool, poses: &[f64]) -> PyResult<Loads<'a>> {
+    Ok(match wrench {
+        None => Loads::Own,
+        Some(array) => {
+            let values = slice(array)?;
+            expect(values, 6, poses)?;
+            Loads::Given(values, if platform_axes { Axes::Platform } else { Axes::Base })
+        }
+    })
+}
+
+#[pymethods]
+impl PyMechanism {
+    #[new]
+    fn new(spec: &str) -> PyResult<Self> {
+        Mechanism::new(&Spec::from_json(spec).map_err(raise)?)
+            .map(PyMechanism)
+            .map_err(raise)
+    }
+
+    #[getter]
+    fn dof(&self) -> usize {
+        self.0.dof()
+    }
+
+    #[getter]
+    fn characteristic_length(&self) -> f64 {
+        self.0.characteristic_length
+    }
+
+    #[getter]
+    fn home<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let (r, o) = (self.0.home.rotation.rows(), self.0.home.o.array());
+        let mut m = vec![0.0; 16];
+        for k in 0..3 {
+            m[4 * k..4 * k + 4].copy_from_slice(&[r[k][0], r[k][1], r[k][2], o[k]]);
+        }
+        m[15] = 1.0;
+        Ok(PyArray1::from_vec(py, m).reshape([4, 4])?.into_any())
+    }
+
+    /// Letters of each leg's joints from base to platform.
+    #[getter]
+    fn leg_letters(&self) -> Vec<String> {
+        self.0
+            .legs
+            .iter()
+            .map(polypod_core::mechanism::Leg::letters)
+            .collect()
+    }
+
+    /// Name, all numbers, and whether each must be given (none for a set where any will do).
+    fn coordinate_sets(&self) -> Vec<(&'static str, Vec<&'static str>, Option<Vec<bool>>)> {
+        Set::of(&self.0)
+            .iter()
+            .map(|s| (s.name(), s.names().to_vec(), s.given(&self.0)))
+            .collect()
+    }
+
+    /// The mobility analysis as JSON.
+    fn mobility(&self) -> PyResult<String> {
+        serde_json::to_string(&self.0.mobility).map_err(|e| PyValueError::new_err(e.to_string()))
+    }
+
+    #[pyo3(signature = (set, given, count, branch, guess, continued))]
+    #[allow(clippy::too_many_arguments)]
+    fn states<'py>(
+        &self,
+        py: Python<'py>,
+        set: &str,
+        given: Vec<Option<[Array<'py>; 3]>>,
+        count: usize,
+        branch: f64,
+        guess: Option<Array<'py>>,
+        continued: bool,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        let set = self.set(set)?;
+        if given.len() != set.names().len() {
+            return Err(PyValueError::new_err(
+                "needs one entry for each number of the set",
+            ));
+        }
+        let mut series = Vec::with_capacity(given.len());
+        for entry in &given {
+            series.push(match entry {
+                None => None,
+                Some([x, d, dd]) => {
+                    let parts = [slice(x)?, slice(d)?, slice(dd)?];
+                    if parts.iter().any(|p| p.len() != count) {
+                        return Err(PyValueError::new_err(
+                            "coordinates do not have one value for each state",
+                        ));
+                    }
+                    Some(parts)
+                }
+            });
+        }
+        let guess = guess.as_ref().map(slice).transpose()?;
+        if guess.is_some_and(|g| g.len() != 16 && g.len() != 16 * count) {
+            return Err(PyValueError::new_err("needs one guess, or one for each state"));
+        }
+        let input = Coordinates {
+            set,
+            given: series,
+            branch,
+            guess,
+            continued,
+        };
+        let table = py.detach(|| batch::states(&self.0, &input, count));
+        arrays(py, table)
+    }
+
+    fn coordinates<'py>(
+        &self,
+        py: Python<'py>,
+        set: &str,
+        poses: Array<'py>,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        let (set, poses) = (self.set(set)?, slice(&poses)?);
+        let table = py.detach(|| batch::coordinate_values(&self.0, &set, poses));
+        arrays(py, table)
+    }
+
+    fn inverse_kinematics<'py>(&self, py: Python<'py>, poses: Array<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let poses = slice(&poses)?;
+        let table = py.detach(|| batch::inverse_kinematics(&self.0, poses));
+        arrays(py, table)
+    }
+
+    fn jacobian<'py>(&self, py: Python<'py>, poses: Array<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let poses = slice(&poses)?;
+        let table = py.detach(|| batch::jacobians(&self.0, poses));
+        arrays(py, table)
+    }
+
+    fn hessian<'py>(&self, py: Python<'py>, poses: Array<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let poses = slice(&poses)?;
+        let table = py.detach(|| batch::hessians(&self.0, poses));
+        arrays(py, table)
+    }
+
+    fn conditioning<'py>(&self, py: Python<'py>, poses: Array<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let poses = slice(&poses)?;
+        let table = py.detach(|| batch::conditioning(&self.0, poses));
+        arrays(py, table)
+    }
+
+    fn kinematics<'py>(
+        &self,
+        py: Python<'py>,
+        poses: Array<'py>,
+        twists: Array<'py>,
+        accelerations: Array<'py>,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        let states = states(&poses, &twists, &accelerations)?;
+        let table = py.detach(|| batch::kinematics(&self.0, &states));
+        arrays(py, table)
+    }
+
+    #[pyo3(signature = (poses, twists, accelerations, wrenches, platform_axes))]
+    fn inverse_dynamics<'py>(
+        &self,
+        py: Python<'py>,
+        poses: Array<'py>,
+        twists: Array<'py>,
+        accelerations: Array<'py>,
+        wrenches: Option<Array<'py>>,
+        platform_axes: bool,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        let states = states(&poses, &twists, &accelerations)?;
+        let loads = loads(wrenches.as_ref(), platform_axes, states.poses)?;
+        let table = py.detach(|| batch::inverse_dynamics(&self.0, &states, &loads));
+        arrays(py, table)
+    }
+
+    #[pyo3(signature = (poses, twists, accelerations, wrenches, platform_axes))]
+    fn power<'py>(
+        &self,
+        py: Python<'py>,
+        poses: Array<'py>,
+        twists: Array<'py>,
+        accelerations: Array<'py>,
+        wrenches: Option<Array<'py>>,
+        platform_axes: bool,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        let states = states(&poses, &twists, &accelerations)?;
+        let loads = loads(wrenches.as_ref(), platform_axes, states.poses)?;
+        let table = py.detach(|| batch::power(&self.0, &states, &loads));
+        arrays(py, table)
+    }
+
+    fn platform_twist<'py>(
+        &self,
+        py: Python<'py>,
+        poses: Array<'py>,
+        rates: Array<'py>,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        let (poses, rates) = (slice(&poses)?, slice(&rates)?);
+        expect(rates, self.0.legs.len(), poses)?;
+        let table = py.detach(|| batch::platform_twist(&self.0, poses, rates));
+        arrays(py, table)
+    }
+
+    fn platform_acceleration<'py>(
+        &self,
+        py: Python<'py>,
+        poses: Array<'py>,
+        twists: Array<'py>,
+        accelerations: Array<'py>,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        let (poses, twists, accelerations) = (slice(&poses)?, slice(&twists)?, slice(&accelerations)?);
+        expect(twists, 6, poses)?;
+        expect(accelerations, self.0.legs.len(), poses)?;
+        let table = py.detach(|| batch::platform_acceleration(&self.0, poses, twists, accelerations));
+        arrays(py, table)
+    }
+
+    /// The two legs and their arrays, or none for a mechanism without a coupled pair.
+    fn coupled_forces<'py>(
+        &self,
+        py: Python<'py>,
+        poses: Array<'py>,
+        multipliers: Array<'py>,
+        as_printed: bool,
+    ) -> PyResult<Option<([usize; 2], Bound<'py, PyDict>)>> {
+        let (poses, multipliers) = (slice(&poses)?, slice(&multipliers)?);
+        expect(multipliers, 6 - self.0.dof(), poses)?;
+        let result = py.detach(|| batch::coupled_forces(&self.0, poses, multipliers, as_printed));
+        result
+            .map(|(pair, table)| Ok((pair, arrays(py, table)?)))
+            .transpose()
+    }
+}
+
+fn states<'a>(
+    poses: &'a Array<'_>,
+    twists: &'a Array<'_>,
+    accelerations: &'a Array<'_>,
+) -> PyResult<States<'a>> {
+    let (poses, twists, accelerations) = (slice(poses)?, slice(twists)?, slice(accelerations)?);
+    expect(twists, 6, poses)?;
+    expect(accelerations, 6, poses)?;
+    Ok(States {
+        poses,
+        twists,
+        accelerations,
+    })
+}
+
+/// Code and message of every status.
+#[pyfunction]
+fn statuses() -> Vec<(u8, String, &'static str)> {
+    Status::ALL
+        .iter()
+        .map(|&s| (s as u8, format!("{s:?}"), s.message()))
+        .collect()
+}
+
+#[pymodule]
+fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
+    m.add("__version__", env!("CARGO_PKG_VERSION"))?;
+    m.add("Faults", m.py().get_type::<Faults>())?;
+    m.add_class::<PyMechanism>()?;
+    m.add_function(wrap_pyfunction!(statuses, m)?)
+}

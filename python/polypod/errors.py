@@ -1,0 +1,86 @@
+"""What Polypod raises when a call or a file is wrong. Numerical outcomes never raise: see `Status`."""
+
+from __future__ import annotations
+
+import difflib
+import json
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+
+class PolypodError(Exception):
+    """The root of everything that Polypod raises on purpose."""
+
+
+@dataclass(frozen=True)
+class Fault:
+    """One thing wrong in a file: where (`legs.3.stroke`, `line 17`; counted from 1) and what."""
+
+    place: str
+    message: str
+
+    def __str__(self) -> str:
+        return f"{self.place}: {self.message}"
+
+
+class _FaultyInputError(PolypodError):
+    """An input with faults: all of them, each once, in `faults`."""
+
+    def __init__(self, faults: Iterable[Fault], source: str) -> None:
+        self.faults = tuple(dict.fromkeys(faults))
+        self.source = source
+        super().__init__(self.faults, source)
+
+    def __str__(self) -> str:
+        count = "1 fault" if len(self.faults) == 1 else f"{len(self.faults)} faults"
+        return "\n  ".join([f"{self.source} has {count}:", *map(str, self.faults)])
+
+
+class MechanismError(_FaultyInputError):
+    """A mechanism that cannot be made: `faults` holds everything wrong with it."""
+
+    def __init__(self, faults: Iterable[Fault], source: str = "the mechanism") -> None:
+        super().__init__(faults, source)
+
+
+class MotionError(_FaultyInputError):
+    """A motion that cannot be used: `faults` holds everything wrong with it."""
+
+    def __init__(self, faults: Iterable[Fault], source: str = "the motion") -> None:
+        super().__init__(faults, source)
+
+
+class SolutionError(PolypodError):
+    """A file of results that cannot be read or written."""
+
+
+class CoordinateError(PolypodError):
+    """Coordinates that make up no coordinate set of the mechanism."""
+
+
+class ShapeError(PolypodError):
+    """An array whose shape does not fit."""
+
+
+class UnknownNameError(PolypodError):
+    """A name that stands for nothing here; the message lists those that do."""
+
+    def __init__(self, kind: str, name: str, valid: Iterable[str]) -> None:
+        self.kind, self.name, self.valid = kind, name, tuple(valid)
+        super().__init__(kind, name, self.valid)
+
+    def __str__(self) -> str:
+        return f"there is no {self.kind} {shown(self.name)}; {alternatives(self.name, self.valid)}"
+
+
+def alternatives(name: str, valid: Iterable[str]) -> str:
+    """The end of a message about an unknown name: the likeliest valid one, then all of them."""
+    names = list(valid)
+    near = difflib.get_close_matches(name, names, n=1)
+    hint = f"did you mean {shown(near[0])}? " if near else ""
+    return f"{hint}valid: {', '.join(names) or 'none'}"
+
+
+def shown(value: object) -> str:
+    """A value as a file writes it; a table is only called one."""
+    return "a table" if isinstance(value, dict) else json.dumps(value, ensure_ascii=False, default=str)

@@ -1,0 +1,641 @@
+"""The mechanism and everything that can be asked of it. The equations are the core's; here are shapes and names."""
+
+from __future__ import annotations
+
+import copy
+import json
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from importlib.resources import files
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import tomli_w
+from numpy.typing import ArrayLike, NDArray
+
+from polypod import _core
+from polypod.errors import CoordinateError, Fault, MechanismError, ShapeError, UnknownNameError, alternatives
+from polypod.schema import read_spec
+
+Array = NDArray[np.float64]
+Codes = NDArray[np.uint8]
+
+NEAR_SINGULAR = 0.02
+"""Smallest singular value (a pure number) below which a pose is called nearly singular."""
+
+
+class State(NamedTuple):
+    """A platform's motion, and all numbers of its coordinate set."""
+
+    pose: Array
+    """(..., 4, 4)."""
+    twist: Array
+    """(..., 6): v of o in m/s, ω in rad/s."""
+    acceleration: Array
+    """(..., 6): a of o in m/s^2, ε in rad/s^2."""
+    coordinates: dict[str, Array]
+    """Given and dependent ones, m and rad."""
+    coordinate_rates: dict[str, Array]
+    coordinate_second_rates: dict[str, Array]
+    status: Codes
+
+
+class InverseKinematics(NamedTuple):
+    """Legs at a pose [Eq. 3]."""
+
+    lengths: Array
+    """(..., n), m."""
+    vectors: Array
+    """(..., n, 3): r from B to b, m."""
+    directions: Array
+    """(..., n, 3): δ."""
+    status: Codes
+
+
+class Kinematics(NamedTuple):
+    """Motion of legs, rods, links and joints [Eq. 2-39], base axes, SI."""
+
+    lengths: Array
+    rates: Array
+    accelerations: Array
+    directions: Array
+    leg_omega: Array
+    leg_eps: Array
+    leg_spin: Array
+    """Share of the leg's angular velocity along δ, rad/s."""
+    leg_spin_rate: Array
+    piston_velocity: Array
+    piston_acceleration: Array
+    cylinder_velocity: Array
+    cylinder_acceleration: Array
+    base_joint_angles: Array
+    """(..., n, 2): leg against base, zero at home: about the axis in the base, then about n; NaN where none."""
+    base_joint_rates: Array
+    platform_joint_angles: Array
+    """(..., n, 2): platform against leg, zero at home: about the axis in the platform, then about n [Eq. 29]."""
+    platform_joint_rates: Array
+    base_cone_angle: Array
+    """(..., n): between leg and cone axis of the base joint, rad."""
+    platform_cone_angle: Array
+    rod_angle: Array
+    """(..., k): turn of each rod about its line, zero at home."""
+    rod_omega: Array
+    rod_eps: Array
+    status: Codes
+
+
+class InverseDynamics(NamedTuple):
+    """What balances a motion [Eq. 43]."""
+
+    forces: Array
+    """(..., n): active forces, N, positive when they push the platform away; zero for passive legs."""
+    constraint: Array
+    """(..., k): multipliers of the independent constraints; f_c in N for the paper's mechanism."""
+    status: Codes
+
+
+class CoupledForces(NamedTuple):
+    """Forces of two legs on one rod, and the torque on the rod [T16]."""
+
+    legs: tuple[str, str]
+    forces: Array
+    """(..., 2): f_c1 and f_c3 along c_1 = r_1×L/|r_1×L| on the platform at b_1 and b_3, N."""
+    torque: Array
+    """(...): T_c about the rod's line, N m."""
+    status: Codes
+
+
+class Power(NamedTuple):
+    """Energies and powers of a motion [T17]; W and J."""
+
+    kinetic: Array
+    potential: Array
+    kinetic_rate: Array
+    potential_rate: Array
+    actuators: Array
+    load: Array
+    damping: Array
+    friction: Array
+    """Power that the efficiency η stands for, negative where it takes."""
+    residual: Array
+    """actuators + load + damping + friction - kinetic_rate - potential_rate: zero up to rounding."""
+    status: Codes
+
+
+class Conditioning(NamedTuple):
+    """Singular values of the leg Jacobian on the twists that the constraints allow [T24]; pure numbers."""
+
+    sigma_min: Array
+    sigma_max: Array
+    condition: Array
+    status: Codes
+
+
+@dataclass(frozen=True)
+class GraphLink:
+    """A link of the topology graph; `joints` are indices."""
+
+    name: str
+    joints: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class GraphJoint:
+    """A joint of the topology graph between two links."""
+
+    kind: str
+    name: str
+    links: tuple[int, int]
+
+
+@dataclass(frozen=True)
+class Published:
+    """The accounting that the mechanism's publication gives."""
+
+    dof: int
+    redundant: int
+    passive: int
+
+
+@dataclass(frozen=True)
+class Mobility:
+    """Freedoms of the mechanism from ranks at generic poses, in the terms of Eq. 1 [T18]."""
+
+    dof: int
+    links: int
+    joints: int
+    joint_freedoms: int
+    loops: int
+    closure_rank: int
+    redundant: int
+    """Loop-closure equations that say nothing new: ς of Eq. 1."""
+    redundant_legs: tuple[str, ...]
+    """The legs whose constraints they couple."""
+    passive: int
+    """Freedoms that leave the platform where it is: M_0 of Eq. 1."""
+    passive_legs: tuple[str, ...]
+    constraint_rows: tuple[tuple[str, str], ...]
+    """Leg and kind (A-D) of every scalar constraint."""
+    independent_rows: tuple[int, ...]
+    """Indices of those that are independent."""
+    graph_links: tuple[GraphLink, ...]
+    graph_joints: tuple[GraphJoint, ...]
+    published: Published | None
+
+
+class Mechanism:
+    """A parallel manipulator; made by `polypod.load`, never changed.
+
+    Arrays may have any leading axes, which broadcast; a `pose` is `(..., 4, 4)`, `twist` and `acceleration` are
+    `(..., 6)` at o in base axes. No method raises for a numerical outcome: see `Status`.
+    """
+
+    def __init__(
+        self, data: Mapping[str, Any], *, text: str | None = None, origin: str = "the mechanism"
+    ) -> None:
+        self._data: dict[str, Any] = copy.deepcopy(dict(data))
+        self._text = text
+        spec, faults = read_spec(self._data)
+        try:
+            self._core = _core.Mechanism(json.dumps(spec))
+        except _core.Faults as error:
+            raise MechanismError([*faults, *(Fault(*f) for f in error.args[0])], origin) from None
+        if faults:
+            raise MechanismError(faults, origin)
+        self._spec = spec
+        legs = spec["legs"]
+        self.name: str = spec["name"]
+        self.leg_names: tuple[str, ...] = tuple(leg["name"] for leg in legs)
+        self.rod_names: tuple[str, ...] = tuple(rod["name"] for rod in spec["rods"])
+        self._sets = {name: (tuple(names), given) for name, names, given in self._core.coordinate_sets()}
+
+    # --- files -------------------------------------------------------------------------------------------
+
+    @classmethod
+    def from_toml(cls, text: str, *, origin: str = "the mechanism") -> Mechanism:
+        """The mechanism that a TOML text describes.
+
+        Raises MechanismError with every fault and its place.
+        """
+        try:
+            data = tomllib.loads(text)
+        except tomllib.TOMLDecodeError as error:
+            raise MechanismError([Fault("toml", str(error))], origin) from None
+        return cls(data, text=text, origin=origin)
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any]) -> Mechanism:
+        """The mechanism that the content of a file describes, as nested dictionaries in the file's units."""
+        return cls(data)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The content of the file, as it was given."""
+        return copy.deepcopy(self._data)
+
+    def to_toml(self) -> str:
+        """The file's text: the very text that it was read from, comments included, if it was."""
+        return tomli_w.dumps(self._data) if self._text is None else self._text
+
+    def save(self, path: str | Path) -> None:
+        """Writes the mechanism file."""
+        Path(path).write_text(self.to_toml(), encoding="utf-8")
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Mechanism) and self._data == other._data
+
+    __hash__ = None  # type: ignore[assignment]
+
+    def __repr__(self) -> str:
+        return f"<Mechanism {self.name}: {'+'.join(self.leg_letters)}, {self.dof} freedoms>"
+
+    # --- what it is --------------------------------------------------------------------------------------
+
+    @property
+    def dof(self) -> int:
+        """Freedoms of the platform at generic poses."""
+        return self._core.dof
+
+    @property
+    def n_legs(self) -> int:
+        """Number of legs, passive ones too: the n of the arrays."""
+        return len(self.leg_names)
+
+    @property
+    def leg_letters(self) -> tuple[str, ...]:
+        """Joints of each leg from base to platform, such as RPU."""
+        return tuple(self._core.leg_letters)
+
+    @property
+    def actuated(self) -> NDArray[np.bool_]:
+        """(n,): which legs have an actuator."""
+        return np.array([leg["actuated"] for leg in self._spec["legs"]], dtype=bool)
+
+    @property
+    def stroke(self) -> Array:
+        """(n, 2): least and greatest length of each leg, m; 0 and inf where the file gives none."""
+        return np.array([leg["stroke"] or [0.0, np.inf] for leg in self._spec["legs"]])
+
+    @property
+    def home(self) -> Array:
+        """(4, 4): the centre pose."""
+        return self._core.home
+
+    @property
+    def characteristic_length(self) -> float:
+        """Root mean square distance of the platform joints from o, m: what lengths are scaled by."""
+        return self._core.characteristic_length
+
+    @property
+    def geometry(self) -> dict[str, Any]:
+        """Points, axes, bodies and limits in SI, each in the axes of its link."""
+        return copy.deepcopy(self._spec)
+
+    @property
+    def coordinate_sets(self) -> dict[str, tuple[str, ...]]:
+        """The names that each coordinate set takes; of the set `pose` any `dof` may be given."""
+        return {
+            set: names if given is None else tuple(n for n, g in zip(names, given, strict=True) if g)
+            for set, (names, given) in self._sets.items()
+        }
+
+    @property
+    def coupled_legs(self) -> tuple[str, str] | None:
+        """The two legs on one rod that share a constraint, or None: those of `coupled_forces`."""
+        empty = np.empty(0)
+        result = self._core.coupled_forces(empty, empty, False)
+        return None if result is None else (self.leg_names[result[0][0]], self.leg_names[result[0][1]])
+
+    @property
+    def warnings(self) -> list[str]:
+        """What a user of this mechanism should know, in plain words."""
+        mobility, notes = self.mobility(), []
+        sigma = self.conditioning(self.home)
+        if not sigma.sigma_min > NEAR_SINGULAR:
+            notes.append(
+                f"nearly singular at its centre pose: the smallest singular value is {float(sigma.sigma_min):.2g} "
+                f"against {float(sigma.sigma_max):.2g} for the largest. The platform can move there with hardly any "
+                "change of the leg lengths, and forces are large; stay clear of it."
+            )
+        if mobility.redundant:
+            legs = " and ".join(mobility.redundant_legs)
+            notes.append(
+                f"{mobility.redundant} redundant constraints couple legs {legs}: the parts must be made accurately, "
+                "and couples in these joints are statically indeterminate."
+            )
+        if mobility.passive:
+            notes.append(
+                f"legs {', '.join(mobility.passive_legs)} spin freely about their own line "
+                f"({mobility.passive} passive freedoms)."
+            )
+        return notes
+
+    def mobility(self) -> Mobility:
+        """Freedoms, joints, redundant constraints and passive freedoms from ranks at generic poses [Eq. 1, T18]."""
+        m = json.loads(self._core.mobility())
+        names = self.leg_names
+        graph, published = m["graph"], self._data.get("published")
+        return Mobility(
+            **{k: m[k] for k in ("dof", "links", "joints", "joint_freedoms", "loops", "closure_rank")},
+            redundant=m["redundant"],
+            redundant_legs=tuple(names[i] for i in m["redundant_legs"]),
+            passive=m["passive"],
+            passive_legs=tuple(names[i] for i in m["passive_legs"]),
+            constraint_rows=tuple((names[c["leg"]], c["kind"]) for c in m["constraints"]),
+            independent_rows=tuple(i for i, c in enumerate(m["constraints"]) if c["independent"]),
+            graph_links=tuple(GraphLink(link["name"], tuple(link["joints"])) for link in graph["links"]),
+            graph_joints=tuple(GraphJoint(j["kind"], j["name"], (*j["links"],)) for j in graph["joints"]),
+            published=None if published is None else Published(**published),
+        )
+
+    # --- coordinates -------------------------------------------------------------------------------------
+
+    def pose(
+        self, coordinates: Mapping[str, ArrayLike], *, branch: int = +1, guess: ArrayLike | None = None
+    ) -> Array:
+        """(..., 4, 4): the pose with the given coordinates; NaN where there is none (`state` says why).
+
+        Arguments as for `state`.
+        """
+        return self.state(coordinates, branch=branch, guess=guess).pose
+
+    def state(
+        self,
+        coordinates: Mapping[str, ArrayLike],
+        rates: Mapping[str, ArrayLike] | None = None,
+        second_rates: Mapping[str, ArrayLike] | None = None,
+        *,
+        branch: int = +1,
+        guess: ArrayLike | None = None,
+        continued: bool = False,
+    ) -> State:
+        """Pose, and exact twist and acceleration from coordinate rates and second rates [Eq. 2, 5, T19-T23].
+
+        Args:
+            coordinates: by name, m and rad; the names tell the set: see `coordinate_sets`.
+            rates: by the same names, per second; zero where left out.
+            second_rates: likewise.
+            branch: the sign of sin γ in the paper's coordinates, whose γ follows from Eq. 5 up to sign.
+            guess: pose or poses (..., 4, 4) near which dependent coordinates are sought; home by default.
+            continued: start each state's dependent coordinates from the state before, as along a motion.
+
+        Raises:
+            CoordinateError: names that make up no set of this mechanism.
+            ShapeError: arrays that do not broadcast.
+        """
+        if branch not in (-1, +1):
+            raise CoordinateError(f"branch is {branch!r}; must be +1 or -1, the sign of sin γ")
+        set = self._set_of(coordinates)
+        names, _ = self._sets[set]
+        series: list[Mapping[str, ArrayLike]] = [coordinates, rates or {}, second_rates or {}]
+        for extra, kind in zip(series[1:], ("rates", "second_rates"), strict=True):
+            for name in extra:
+                if name not in coordinates:
+                    raise CoordinateError(f"{kind} of {name!r}; {alternatives(name, coordinates)}")
+        flat = [_number(name, s.get(name, 0.0)) for name in coordinates for s in series]
+        guess_array = None if guess is None else _array("guess", guess, (4, 4))
+        shape = _broadcast(*(a.shape for a in flat), () if guess_array is None else guess_array.shape[:-2])
+        columns = iter(_spread(a, shape, ()) for a in flat)
+        by_name = {name: [next(columns) for _ in series] for name in coordinates}
+        table = self._core.states(
+            set,
+            [by_name.get(name) for name in names],
+            int(np.prod(shape)),
+            float(branch),
+            None if guess_array is None else _spread(guess_array, shape, (4, 4)),
+            continued,
+        )
+        out = _shaped(table, shape)
+        split = [
+            dict(zip(names, np.moveaxis(out[key], -1, 0), strict=True))
+            for key in ("coordinates", "coordinate_rates", "coordinate_second_rates")
+        ]
+        return State(out["pose"], out["twist"], out["acceleration"], *split, out["status"])
+
+    def coordinates(self, pose: ArrayLike, set: str | None = None) -> dict[str, Array]:
+        """All numbers of a coordinate set at a pose, m and rad: the inverse of `pose`. The first set by default.
+
+        NaN for a pose that breaks a constraint.
+        """
+        set = next(iter(self._sets)) if set is None else set
+        if set not in self._sets:
+            raise UnknownNameError("coordinate set", set, self._sets)
+        shape, (poses,) = self._batch(pose=(pose, (4, 4)))
+        out = _shaped(self._core.coordinates(set, poses), shape)
+        return dict(zip(self._sets[set][0], np.moveaxis(out["coordinates"], -1, 0), strict=True))
+
+    def _set_of(self, coordinates: Mapping[str, ArrayLike]) -> str:
+        """The set whose given names these are."""
+        given = {*coordinates}
+        for set, names in self.coordinate_sets.items():
+            if given == {*names} or (set == "pose" and given <= {*names} and len(given) == self.dof):
+                return set
+        choices = "; ".join(
+            f"{set}: {'any ' + str(self.dof) + ' of ' if set == 'pose' else ''}{', '.join(names)}"
+            for set, names in self.coordinate_sets.items()
+        )
+        raise CoordinateError(
+            f"{self.name} has no coordinate set with {', '.join(map(str, coordinates)) or 'no names'}; valid: {choices}"
+        )
+
+    # --- kinematics --------------------------------------------------------------------------------------
+
+    def inverse_kinematics(self, pose: ArrayLike) -> InverseKinematics:
+        """Lengths, vectors and directions of the legs at a pose [Eq. 3]."""
+        shape, (poses,) = self._batch(pose=(pose, (4, 4)))
+        return InverseKinematics(**_shaped(self._core.inverse_kinematics(poses), shape))
+
+    def jacobian(self, pose: ArrayLike) -> Array:
+        """(..., 6, 6): J of `J V = (ℓ', 0)`: actuated legs, then independent constraints [Eq. 13].
+
+        For any pose, on the constraints or not.
+        """
+        shape, (poses,) = self._batch(pose=(pose, (4, 4)))
+        return _shaped(self._core.jacobian(poses), shape)["jacobian"]
+
+    def hessian(self, pose: ArrayLike) -> Array:
+        """(..., 6, 6, 6): H of `J A + Vᵀ H V = (ℓ'', 0)`, a symmetric layer for each row of J [Eq. 15-19].
+
+        For any pose, on the constraints or not.
+        """
+        shape, (poses,) = self._batch(pose=(pose, (4, 4)))
+        return _shaped(self._core.hessian(poses), shape)["hessian"]
+
+    def kinematics(self, pose: ArrayLike, twist: ArrayLike, acceleration: ArrayLike) -> Kinematics:
+        """Motion of all legs, rods, links and joints [Eq. 2-39].
+
+        A twist or acceleration that breaks a constraint has the status OFF_CONSTRAINT and no numbers.
+        """
+        shape, states = self._states(pose, twist, acceleration)
+        return Kinematics(**_shaped(self._core.kinematics(*states), shape))
+
+    def platform_twist(self, pose: ArrayLike, rates: ArrayLike) -> tuple[Array, Codes]:
+        """The twist (..., 6) that gives the legs these rates (..., n), m/s, and the status [Eq. 13]."""
+        shape, arrays = self._batch(pose=(pose, (4, 4)), rates=(rates, (self.n_legs,)))
+        out = _shaped(self._core.platform_twist(*arrays), shape)
+        return out["twist"], out["status"]
+
+    def platform_acceleration(
+        self, pose: ArrayLike, twist: ArrayLike, accelerations: ArrayLike
+    ) -> tuple[Array, Codes]:
+        """The acceleration (..., 6) that gives the legs these accelerations (..., n), and the status [Eq. 19]."""
+        shape, arrays = self._batch(
+            pose=(pose, (4, 4)), twist=(twist, (6,)), accelerations=(accelerations, (self.n_legs,))
+        )
+        out = _shaped(self._core.platform_acceleration(*arrays), shape)
+        return out["acceleration"], out["status"]
+
+    def conditioning(self, pose: ArrayLike) -> Conditioning:
+        """Singular values of the leg Jacobian on the allowed twists, lengths in `characteristic_length` [T24]."""
+        shape, (poses,) = self._batch(pose=(pose, (4, 4)))
+        return Conditioning(**_shaped(self._core.conditioning(poses), shape))
+
+    # --- dynamics ----------------------------------------------------------------------------------------
+
+    def inverse_dynamics(
+        self,
+        pose: ArrayLike,
+        twist: ArrayLike,
+        acceleration: ArrayLike,
+        wrench: ArrayLike | None = None,
+        wrench_axes: str = "base",
+    ) -> InverseDynamics:
+        """Active forces and constraint multipliers that keep up a motion under load [Eq. 40-43].
+
+        Args:
+            pose: (..., 4, 4).
+            twist: (..., 6).
+            acceleration: (..., 6).
+            wrench: load on the platform at o, (..., 6), N and N m; the mechanism's own by default.
+            wrench_axes: the axes of `wrench`, "base" or "platform".
+        """
+        shape, args = self._loaded_states(pose, twist, acceleration, wrench, wrench_axes)
+        return InverseDynamics(**_shaped(self._core.inverse_dynamics(*args), shape))
+
+    def power(
+        self,
+        pose: ArrayLike,
+        twist: ArrayLike,
+        acceleration: ArrayLike,
+        wrench: ArrayLike | None = None,
+        wrench_axes: str = "base",
+    ) -> Power:
+        """Energies and every power of their balance [T17]. Arguments as for `inverse_dynamics`."""
+        shape, args = self._loaded_states(pose, twist, acceleration, wrench, wrench_axes)
+        return Power(**_shaped(self._core.power(*args), shape))
+
+    def coupled_forces(
+        self, pose: ArrayLike, constraint: ArrayLike, *, as_printed: bool = False
+    ) -> CoupledForces:
+        """The couple-constrained forces f_c1, f_c3 and the torque T_c of two legs on one rod [T16].
+
+        Args:
+            pose: (..., 4, 4).
+            constraint: multipliers (..., k) from `inverse_dynamics`.
+            as_printed: Eq. 44 as the paper prints it, which contradicts its own Eq. 7.
+
+        Raises:
+            CoordinateError: the mechanism has no two legs that share a constraint on one rod.
+        """
+        shape, arrays = self._batch(pose=(pose, (4, 4)), constraint=(constraint, (6 - self.dof,)))
+        result = self._core.coupled_forces(*arrays, as_printed)
+        if result is None:
+            raise CoordinateError(f"{self.name} has no two legs that share a constraint on one rod")
+        first, second = result[0]
+        return CoupledForces((self.leg_names[first], self.leg_names[second]), **_shaped(result[1], shape))
+
+    # --- arrays ------------------------------------------------------------------------------------------
+
+    def _states(
+        self, pose: ArrayLike, twist: ArrayLike, acceleration: ArrayLike
+    ) -> tuple[tuple[int, ...], list[Array]]:
+        return self._batch(pose=(pose, (4, 4)), twist=(twist, (6,)), acceleration=(acceleration, (6,)))
+
+    def _loaded_states(
+        self,
+        pose: ArrayLike,
+        twist: ArrayLike,
+        acceleration: ArrayLike,
+        wrench: ArrayLike | None,
+        wrench_axes: str,
+    ) -> tuple[tuple[int, ...], tuple[Any, ...]]:
+        if wrench_axes not in ("base", "platform"):
+            raise UnknownNameError("wrench_axes", wrench_axes, ("base", "platform"))
+        if wrench is None:
+            shape, states = self._states(pose, twist, acceleration)
+            return shape, (*states, None, False)
+        shape, arrays = self._batch(
+            pose=(pose, (4, 4)), twist=(twist, (6,)), acceleration=(acceleration, (6,)), wrench=(wrench, (6,))
+        )
+        return shape, (*arrays, wrench_axes == "platform")
+
+    @staticmethod
+    def _batch(**arguments: tuple[ArrayLike, tuple[int, ...]]) -> tuple[tuple[int, ...], list[Array]]:
+        """The common leading shape of named arrays with the given trailing shapes, and the arrays spread to it."""
+        arrays = {name: _array(name, value, core) for name, (value, core) in arguments.items()}
+        shape = _broadcast(*(a.shape[: a.ndim - len(arguments[name][1])] for name, a in arrays.items()))
+        return shape, [_spread(a, shape, arguments[name][1]) for name, a in arrays.items()]
+
+
+def _number(name: str, value: ArrayLike) -> Array:
+    return _array(name, value, ())
+
+
+def _array(name: str, value: ArrayLike, core: tuple[int, ...]) -> Array:
+    """`value` as doubles whose last axes are `core`."""
+    try:
+        array = np.asarray(value, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise ShapeError(f"{name} is not an array of numbers: {error}") from None
+    if array.shape[array.ndim - len(core) :] != core:
+        expected = ", ".join(["...", *map(str, core)])
+        raise ShapeError(f"{name} has the shape {array.shape}; needs ({expected})")
+    return array
+
+
+def _broadcast(*shapes: tuple[int, ...]) -> tuple[int, ...]:
+    try:
+        return np.broadcast_shapes(*shapes)
+    except ValueError:
+        raise ShapeError(f"leading axes {', '.join(map(str, shapes))} do not broadcast") from None
+
+
+def _spread(array: Array, shape: tuple[int, ...], core: tuple[int, ...]) -> Array:
+    """Flat and contiguous, one row for each state."""
+    return np.ascontiguousarray(np.broadcast_to(array, shape + core)).reshape(-1)
+
+
+def _shaped(table: Mapping[str, NDArray[Any]], shape: tuple[int, ...]) -> dict[str, NDArray[Any]]:
+    """The core's arrays with the batch's own leading axes."""
+    return {name: array.reshape(shape + array.shape[1:]) for name, array in table.items()}
+
+
+def list_mechanisms() -> tuple[str, ...]:
+    """Names of the built-in mechanisms."""
+    return tuple(
+        sorted(f.name.removesuffix(".toml") for f in _built_in().iterdir() if f.name.endswith(".toml"))
+    )
+
+
+def load(source: str | Path) -> Mechanism:
+    """The mechanism of a file, or a built-in one by its name.
+
+    Raises:
+        MechanismError: everything wrong with the file, each with its place.
+        UnknownNameError: no such file and no such built-in mechanism.
+    """
+    name, path = str(source), Path(source)
+    if name in list_mechanisms():
+        return Mechanism.from_toml((_built_in() / f"{name}.toml").read_text(encoding="utf-8"), origin=name)
+    if not path.is_file():
+        raise UnknownNameError("mechanism file or built-in mechanism", name, list_mechanisms())
+    try:
+        text = path.read_text(encoding="utf-8")
+    except UnicodeDecodeError as error:
+        raise MechanismError([Fault("toml", f"is not UTF-8 text: {error}")], name) from None
+    return Mechanism.from_toml(text, origin=name)
+
+
+def _built_in() -> Any:
+    return files("polypod") / "mechanisms"

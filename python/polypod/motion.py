@@ -1,0 +1,433 @@
+"""Motions: the coordinates of a mechanism over time with exact rates and second rates, and the load.
+
+Two files make a motion. A CSV file gives samples; its header names coordinates and units:
+
+    time [s], x [mm], y [mm], z [mm], alpha [deg], beta [deg], force_z [N]
+
+A TOML file gives keyframes and the curve through them:
+
+    [motion]
+    coordinates = "paper"       # the coordinate set
+    branch = 1                  # of the set, where it has two: 1 or -1
+    spline = "quintic"          # or "minimum-jerk"
+    samples = 501
+    [units]
+    time = "s"
+    length = "mm"
+    angle = "deg"
+    force = "N"
+    [wrench]                    # optional: force, torque, axes ("base" or "platform")
+    force = [0, 0, 500]
+    [[keyframes]]               # two or more, each with all coordinates; may have its own force and torque
+    time = 0
+    x = 0
+"""
+
+from __future__ import annotations
+
+import csv
+import math
+import re
+import tomllib
+from collections import Counter
+from collections.abc import Iterable, Mapping
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
+from importlib import resources
+from importlib.resources.abc import Traversable
+from itertools import islice, pairwise
+from os import PathLike
+from pathlib import Path
+from typing import Annotated, Any, Literal, NamedTuple, Protocol
+
+import numpy as np
+from annotated_types import Ge
+from numpy.typing import ArrayLike, NDArray
+from pydantic import Strict, create_model
+from scipy.interpolate import BPoly, make_interp_spline
+
+from polypod.errors import Fault, MotionError, ShapeError, UnknownNameError, alternatives, shown
+from polypod.schema import Number, Table, Vector, read_table
+from polypod.units import MOTION_KINDS, UNITS, read_units, to_si
+
+Array = NDArray[np.float64]
+Axes = Literal["base", "platform"]
+
+KIND_OF_COORDINATE: dict[str, str | None] = {
+    **dict.fromkeys(("x", "y", "z", "p", "h", "tip_x", "tip_y", "tip_z"), "length"),
+    **dict.fromkeys(("alpha", "beta", "gamma", "rx", "ry", "rz"), "angle"),
+    **dict.fromkeys(("axis_x", "axis_y", "axis_z")),  # a direction of any length, without unit
+}
+KIND_OF_WRENCH: dict[str, str | None] = {
+    **dict.fromkeys(("force_x", "force_y", "force_z"), "force"),
+    **dict.fromkeys(("torque_x", "torque_y", "torque_z"), "torque"),
+}
+
+CoordinateSets = Mapping[str, tuple[str, ...]]
+
+
+class HasCoordinateSets(Protocol):
+    """What a motion needs of a mechanism."""
+
+    @property
+    def coordinate_sets(self) -> CoordinateSets: ...
+
+
+class Curve(Protocol):
+    """Coordinates over time (..., number of coordinates), or their derivative of order `nu`."""
+
+    def __call__(self, x: Array, nu: int = 0) -> Array: ...
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """Coordinates of the set `set` at N instants, SI, with their exact rates and second rates."""
+
+    name: str
+    set: str
+    time: Array  # (N,), s, increasing
+    coordinates: dict[str, Array]  # each (N,), m or rad
+    rates: dict[str, Array]
+    second_rates: dict[str, Array]
+    branch: int = 1
+    wrench: Array | None = None  # (N, 6), force and torque on the platform at o; None for the mechanism's own
+    wrench_axes: Axes = "base"
+    curve: Curve | None = field(default=None, repr=False)
+
+    def __post_init__(self) -> None:
+        n = self.time.shape
+        arrays = {"time": self.time} | self.coordinates | self.rates | self.second_rates
+        for name, array in arrays.items():
+            if array.shape != n or array.ndim != 1:
+                raise ShapeError(f"{name} has shape {array.shape}; needs (N,), the same for all")
+        if not self.coordinates.keys() == self.rates.keys() == self.second_rates.keys():
+            raise ShapeError("coordinates, rates and second_rates must have the same names")
+        if self.wrench is not None and self.wrench.shape != (*n, 6):
+            raise ShapeError(f"wrench has shape {self.wrench.shape}; needs {(*n, 6)}")
+
+    @classmethod
+    def through(
+        cls,
+        time: ArrayLike,
+        coordinates: Mapping[str, ArrayLike],
+        *,
+        set: str,
+        name: str = "motion",
+        **more: Any,
+    ) -> Motion:
+        """The motion through samples at `time`, by the quintic spline of `spline_through`; SI."""
+        t = np.asarray(time, dtype=float)
+        values = np.stack([np.asarray(q, dtype=float) for q in coordinates.values()], axis=-1)
+        return cls.along(spline_through(t, values), t, tuple(coordinates), set=set, name=name, **more)
+
+    @classmethod
+    def along(cls, curve: Curve, time: Array, names: tuple[str, ...], **more: Any) -> Motion:
+        """The motion on `curve`, whose last axis is `names`, sampled at `time`."""
+        q, rates, second_rates = (dict(zip(names, curve(time, nu).T, strict=True)) for nu in range(3))
+        return cls(time=time, coordinates=q, rates=rates, second_rates=second_rates, curve=curve, **more)
+
+    def sample(self, time: ArrayLike) -> Motion:
+        """The same motion at other instants, (N,) in s, within its own.
+
+        It follows `curve`, or without one, between two of its samples, the quintic that has their values,
+        rates and second rates. The wrench is linear between samples.
+        """
+        t = np.asarray(time, dtype=float)
+        start, end = self.time[0], self.time[-1]
+        if outside := t[~((start <= t) & (t <= end))].tolist():
+            raise MotionError(
+                [Fault("time", f"is {outside[0]} s; the motion lasts from {start} s to {end} s")], self.name
+            )
+        curve = self.curve or _quintics(
+            self.time,
+            *(np.stack(list(d.values()), axis=-1) for d in (self.coordinates, self.rates, self.second_rates)),
+        )
+        moved = Motion.along(curve, t, tuple(self.coordinates), name=self.name, set=self.set)
+        wrench = None if self.wrench is None else _linear(t, self.time, self.wrench)
+        return replace(moved, branch=self.branch, wrench=wrench, wrench_axes=self.wrench_axes)
+
+
+# --- curves -------------------------------------------------------------------------------------------------
+
+
+def spline_through(time: Array, values: Array) -> Curve:
+    """The quintic spline, with four continuous derivatives, through samples that may begin and end in motion.
+
+    "Not-a-knot" at both ends: the first three intervals share one polynomial, and so do the last three, which
+    makes the spline exact for polynomials up to degree 5 and of sixth order elsewhere. Fewer than six samples
+    are joined by the one polynomial that passes through them.
+    """
+    spline: Curve = make_interp_spline(time, values, k=min(5, len(time) - 1))
+    return spline
+
+
+def quintic(time: Array, values: Array) -> Curve:
+    """The quintic spline, with four continuous derivatives, through all keyframes, at rest at both ends:
+    velocity and acceleration are zero there."""
+    rest = [(1, np.zeros(values.shape[1])), (2, np.zeros(values.shape[1]))]
+    spline: Curve = make_interp_spline(time, values, k=5, bc_type=(rest, rest))
+    return spline
+
+
+def minimum_jerk(time: Array, values: Array) -> Curve:
+    """From rest to rest between consecutive keyframes, q0 + (q1 - q0) (10 s^3 - 15 s^4 + 6 s^5).
+
+    Of all such movements this has the least integral of squared jerk. Flash and Hogan, The coordination of
+    arm movements, J. Neuroscience 5 (1985) 1688-1703.
+    """
+    return _quintics(time, values, np.zeros_like(values), np.zeros_like(values))
+
+
+SPLINES = {"quintic": quintic, "minimum-jerk": minimum_jerk}
+
+
+def _quintics(time: Array, values: Array, rates: Array, second_rates: Array) -> Curve:
+    """One quintic for each interval, fixed by value, rate and second rate at both of its ends."""
+    curve: Curve = BPoly.from_derivatives(time, np.stack([values, rates, second_rates], axis=1))
+    return curve
+
+
+def _linear(time: Array, at: Array, values: Array) -> Array:
+    return np.stack([np.interp(time, at, column) for column in values.T], axis=-1)
+
+
+# --- files --------------------------------------------------------------------------------------------------
+
+
+def load_motion(
+    source: str | PathLike[str],
+    mech: HasCoordinateSets | CoordinateSets,
+    *,
+    branch: Literal[1, -1] | None = None,
+    wrench_axes: Axes | None = None,
+) -> Motion:
+    """The motion in a `.csv` or `.toml` file, or the built-in one of that name, for a mechanism (or for its
+    coordinate sets alone).
+
+    `branch` and `wrench_axes` replace what a TOML file says; without them a CSV file means 1 and "base".
+    Raises MotionError with all faults of the file, UnknownNameError for a built-in that does not exist.
+    """
+    sets = mech if isinstance(mech, Mapping) else mech.coordinate_sets
+    file = _find(source)
+    read = _read_csv if file.name.endswith(".csv") else _read_toml
+    try:
+        motion = read(file.read_text(encoding="utf-8-sig"), str(source), sets)
+    except FileNotFoundError:
+        raise MotionError([Fault("file", "does not exist")], str(source)) from None
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise MotionError([Fault("file", f"cannot be read: {error}")], str(source)) from error
+    return replace(motion, branch=branch or motion.branch, wrench_axes=wrench_axes or motion.wrench_axes)
+
+
+def motion_names() -> list[str]:
+    """Names of the built-in motions."""
+    return sorted(_built_in())
+
+
+def _built_in() -> dict[str, Traversable]:
+    folder = resources.files("polypod") / "motions"
+    return {Path(file.name).stem: file for file in folder.iterdir() if file.name.endswith((".csv", ".toml"))}
+
+
+def _find(source: str | PathLike[str]) -> Traversable:
+    path = Path(source)
+    if path.suffix in (".csv", ".toml"):
+        return path
+    if str(source) in (built_in := _built_in()):
+        return built_in[str(source)]
+    raise UnknownNameError("built-in motion (nor a .csv or .toml file)", str(source), built_in)
+
+
+def _nearest_set(names: Iterable[str], sets: CoordinateSets) -> str:
+    """The coordinate set that differs least from the names given."""
+    given = set(names)
+    return min(sets, key=lambda s: len(given.symmetric_difference(sets[s])))
+
+
+# --- CSV ----------------------------------------------------------------------------------------------------
+
+
+class _Column(NamedTuple):
+    name: str
+    kind: str | None
+    unit: str
+
+
+def _read_csv(text: str, source: str, sets: CoordinateSets) -> Motion:
+    reader = csv.reader(text.splitlines(), skipinitialspace=True)
+    rows = [(f"line {reader.line_num}", [cell.strip() for cell in row]) for row in reader]
+    rows = [(place, row) for place, row in rows if any(row) and not row[0].startswith("#")]
+    if not rows:
+        message = "is empty; needs a header such as time [s], x [mm], ... and two samples or more"
+        raise MotionError([Fault("file", message)], source)
+    (place, header), *body = rows
+    faults: list[Fault] = []
+    columns = _columns(header, place, sets, faults)
+    samples = _samples(body, columns, faults)
+    if faults:
+        raise MotionError(faults, source)
+    by_name = {column.name: samples[:, i] for i, column in enumerate(columns) if column}
+    chosen = _nearest_set(by_name.keys() & KIND_OF_COORDINATE.keys(), sets)
+    wrench = None
+    if by_name.keys() & KIND_OF_WRENCH.keys():
+        zero = np.zeros(len(samples))
+        wrench = np.stack([by_name.get(component, zero) for component in KIND_OF_WRENCH], axis=-1)
+    q = {name: by_name[name] for name in sets[chosen]}
+    return Motion.through(by_name["time"], q, set=chosen, name=Path(source).stem, wrench=wrench)
+
+
+def _columns(
+    header: list[str], place: str, sets: CoordinateSets, faults: list[Fault]
+) -> list[_Column | None]:
+    """The columns that a header names, None for an unknown one."""
+    coordinates = {name: KIND_OF_COORDINATE[name] for names in sets.values() for name in names}
+    kinds = {"time": "time"} | coordinates | KIND_OF_WRENCH
+    columns: list[_Column | None] = []
+    for cell in header:
+        column, message = _column(cell, kinds)
+        columns.append(column)
+        if message:
+            faults.append(Fault(place, f"column {shown(cell)} {message}"))
+    count = Counter(column.name for column in columns if column)
+    faults += [Fault(place, f"column {name} stands there {n} times") for name, n in count.items() if n > 1]
+    if "time" not in count:
+        faults.append(Fault(place, "there is no column time [s]"))
+    given = count.keys() & coordinates.keys()
+    chosen = _nearest_set(given, sets)
+    lacking = [name for name in sets[chosen] if name not in given]
+    beside = [name for name in count if name in given and name not in sets[chosen]]
+    if lacking or beside:
+        found = [*(f"no {name}" for name in lacking), *(f"also {name}" for name in beside)]
+        message = (
+            f"the coordinates are no set; nearest is {chosen} ({', '.join(sets[chosen])}), but there is "
+        )
+        faults.append(Fault(place, message + ", ".join(found)))
+    return columns
+
+
+def _column(cell: str, kinds: Mapping[str, str | None]) -> tuple[_Column | None, str | None]:
+    """The column that a cell of the header names, as far as it does, and what is wrong."""
+    parts = re.fullmatch(r"(\w+)\s*(?:\[(.*)\])?", cell)
+    if not parts:
+        return None, "must be a name and a unit, such as x [mm]"
+    name, unit = parts[1], (parts[2] or "").strip()
+    if name not in kinds:
+        return None, f"is unknown; {alternatives(name, kinds)}"
+    kind = kinds[name]
+    valid = UNITS[kind] if kind else ("", "1")
+    if unit in valid:
+        return _Column(name, kind, unit), None
+    problem = f"has the unit {shown(unit)}" if unit else "has no unit"
+    return _Column(name, None, ""), f"{problem}; {alternatives(unit, valid) if kind else 'it needs none'}"
+
+
+def _samples(body: list[tuple[str, list[str]]], columns: list[_Column | None], faults: list[Fault]) -> Array:
+    """The numbers below the header, SI, (N, columns); NaN where there is a fault."""
+    samples = np.full((len(body), len(columns)), np.nan)
+    for sample, (place, row) in zip(samples, body, strict=True):
+        if len(row) != len(columns):
+            faults.append(Fault(place, f"has {len(row)} cells; the header has {len(columns)}"))
+            continue
+        for i, (cell, column) in enumerate(zip(row, columns, strict=True)):
+            with suppress(ValueError):
+                sample[i] = float(cell)
+            if not math.isfinite(sample[i]):
+                name = column.name if column else f"number {i + 1}"
+                faults.append(Fault(place, f"column {name} is {shown(cell)}; needs a finite number"))
+    if len(body) < 2:
+        faults.append(Fault("file", f"has {len(body)} samples; needs two or more"))
+    for i, column in enumerate(columns):
+        if column and column.name == "time":
+            faults += _not_increasing([place for place, _ in body], samples[:, i].tolist())
+        if column and column.kind:
+            samples[:, i] = to_si(samples[:, i], column.kind, column.unit)
+    return samples
+
+
+def _not_increasing(places: Iterable[str], times: Iterable[float]) -> list[Fault]:
+    return [
+        Fault(place, f"time is {time} after {before}; it must increase")
+        for place, (before, time) in zip(islice(places, 1, None), pairwise(times), strict=False)
+        if time <= before
+    ]
+
+
+# --- TOML ---------------------------------------------------------------------------------------------------
+
+
+class _Settings(Table):
+    description: str = ""
+    coordinates: str
+    branch: Literal[1, -1] = 1
+    spline: Literal["quintic", "minimum-jerk"] = "quintic"
+    samples: Annotated[int, Strict(), Ge(2)] = 501
+
+
+class _Wrench(Table):
+    force: Vector | None = None
+    torque: Vector | None = None
+    axes: Axes = "base"
+
+
+_SECTIONS = ("motion", "units", "wrench", "keyframes")
+
+
+def _read_toml(text: str, source: str, sets: CoordinateSets) -> Motion:
+    data = tomllib.loads(text)
+    faults = [Fault(k, f"is no key here; {alternatives(k, _SECTIONS)}") for k in data if k not in _SECTIONS]
+    settings = read_table(_Settings, data.get("motion", {}), "motion", faults)
+    wrench = read_table(_Wrench, data.get("wrench", {}), "wrench", faults) or _Wrench()
+    tables = data.get("keyframes", [])
+    if not isinstance(tables, list) or len(tables) < 2:
+        faults.append(Fault("keyframes", "needs two tables [[keyframes]] or more"))
+        tables = []
+
+    chosen = settings.coordinates if settings else ""
+    if chosen not in sets:
+        if settings:
+            message = f"is {shown(chosen)}, no coordinate set of the mechanism; {alternatives(chosen, sets)}"
+            faults.append(Fault("motion.coordinates", message))
+        chosen = _nearest_set({key for table in tables if isinstance(table, dict) for key in table}, sets)
+    model = _keyframe(sets[chosen])
+    read = [read_table(model, table, f"keyframes.{i}", faults) for i, table in enumerate(tables, 1)]
+    frames = [frame.model_dump() for frame in read if frame]
+    if len(frames) == len(tables):
+        places = [f"keyframes.{i}.time" for i in range(1, len(frames) + 1)]
+        faults += _not_increasing(places, [frame["time"] for frame in frames])
+
+    loads = [wrench.model_dump(), *frames]
+    loaded = {kind for kind in ("force", "torque") if any(load[kind] for load in loads)}
+    used = {"time", *loaded, *filter(None, map(KIND_OF_COORDINATE.get, sets[chosen]))}
+    units, unit_faults = read_units(data.get("units", {}), used, MOTION_KINDS)
+    if faults or unit_faults or not settings:
+        raise MotionError([*unit_faults, *faults], source)
+
+    def column(key: str, kind: str | None) -> Array:
+        """(keyframes,) or (keyframes, 3); the load is [wrench]'s where a keyframe has none."""
+        default = loads[0].get(key) or [0.0, 0.0, 0.0]
+        values = np.array([default if frame[key] is None else frame[key] for frame in frames])
+        return units.si(values, kind) if kind else values
+
+    at = column("time", "time")
+    q = np.stack([column(name, KIND_OF_COORDINATE[name]) for name in sets[chosen]], axis=-1)
+    time = np.linspace(at[0], at[-1], settings.samples)
+    load = None
+    if loaded:
+        load = _linear(time, at, np.hstack([column("force", "force"), column("torque", "torque")]))
+    return Motion.along(
+        SPLINES[settings.spline](at, q),
+        time,
+        sets[chosen],
+        set=chosen,
+        name=Path(source).stem,
+        branch=settings.branch,
+        wrench=load,
+        wrench_axes=wrench.axes,
+    )
+
+
+def _keyframe(names: Iterable[str]) -> type[Table]:
+    """The table of one keyframe with the coordinates `names`."""
+    fields: dict[str, Any] = dict.fromkeys(("time", *names), (Number, ...))
+    fields |= dict.fromkeys(("force", "torque"), (Vector | None, None))
+    return create_model("Keyframe", __base__=Table, **fields)

@@ -1,0 +1,438 @@
+"""The mechanism file as typed tables, and its translation to the SI description that the core works on.
+
+Here the form is checked: types, keys, units, names. What the numbers mean (a negative mass, an axis along
+its leg) the core checks, on all parts that could be read.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Annotated, Any, Literal, TypeVar
+
+import numpy as np
+from annotated_types import Len
+from pydantic import BaseModel, ConfigDict, Discriminator, Field, Strict, Tag, ValidationError
+
+from polypod.errors import Fault, alternatives, shown
+from polypod.units import MECHANISM_KINDS, Units, cos_sin, read_units
+
+STANDARD_GRAVITY = (0.0, 0.0, -9.81)
+"""m/s^2 in base axes, where the file gives none."""
+
+
+# --- the tables of the file ---------------------------------------------------------------------------------
+
+
+class Table(BaseModel):
+    """A table of a file: its fields are the keys that it may have."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+# Tags end up in the place of an error; <...> marks them, so that they can be left out of it again.
+Number = Annotated[float, Strict(), Field(allow_inf_nan=False)]
+Vector = Annotated[list[Number], Len(3, 3)]
+
+
+def _polar_or_vector(value: object) -> str:
+    return "<polar>" if isinstance(value, dict) else "<vector>"
+
+
+def _number_or_vector(value: object) -> str:
+    return "<number>" if isinstance(value, (int, float)) else "<vector>"
+
+
+def _number_vector_or_matrix(value: object) -> str:
+    match value:
+        case [[*_], *_]:
+            return "<matrix>"
+    return _number_or_vector(value)
+
+
+class PolarPoint(Table):
+    radius: Number
+    angle: Number
+    z: Number = 0.0
+
+
+class PolarAxis(Table):
+    angle: Number
+    z: Number = 0.0
+
+
+_N = Annotated[Number, Tag("<number>")]
+_V = Annotated[Vector, Tag("<vector>")]
+_M = Annotated[list[Vector], Len(3, 3), Tag("<matrix>")]
+Point = Annotated[_V | Annotated[PolarPoint, Tag("<polar>")], Discriminator(_polar_or_vector)]
+Axis = Annotated[_V | Annotated[PolarAxis, Tag("<polar>")], Discriminator(_polar_or_vector)]
+Center = Annotated[_N | _V, Discriminator(_number_or_vector)]
+Inertia = Annotated[_N | _V | _M, Discriminator(_number_vector_or_matrix)]
+
+
+class Header(Table):
+    name: str
+    description: str = ""
+    source: str = ""
+
+
+class Dynamics(Table):
+    gravity: Vector | None = None
+    efficiency: Number = 1.0
+    linear_damping: Number = 0.0
+    angular_damping: Number = 0.0
+
+
+class Load(Table):
+    force: Vector = [0.0, 0.0, 0.0]
+    torque: Vector = [0.0, 0.0, 0.0]
+    axes: Literal["base", "platform"] = "base"
+
+
+class Home(Table):
+    position: Vector
+    rotation_vector: Vector = [0.0, 0.0, 0.0]
+
+
+class Tool(Table):
+    point: Point = [0.0, 0.0, 0.0]
+    axis: Axis = [0.0, 0.0, 1.0]
+
+
+class Published(Table):
+    dof: Annotated[int, Strict()]
+    redundant: Annotated[int, Strict()]
+    passive: Annotated[int, Strict()]
+
+
+class Body(Table):
+    mass: Number
+    center: Vector
+    inertia: Inertia
+
+
+class Link(Table):
+    """Cylinder or piston; `center` may be the distance along the leg from the link's own joint."""
+
+    mass: Number
+    center: Center
+    inertia: Inertia
+
+
+class Rod(Table):
+    name: str
+    point: Point
+    axis: Axis
+    mass: Number | None = None
+    center: Vector | None = None
+    inertia: Inertia | None = None
+
+
+class Stroke(Table):
+    min: Number
+    max: Number
+
+
+class Cone(Table):
+    angle: Number
+    axis: Axis | None = None
+
+
+class Joint(Table):
+    joint: Literal["S", "U", "R", "F"]
+    point: Point
+    axis: Axis | None = None
+    normal: Axis | None = None
+    rod: str | None = None
+    cone: Cone | None = None
+
+
+class Leg(Table):
+    name: str | None = None
+    actuated: Annotated[bool, Strict()] = True
+    stroke: Stroke | None = None
+    radius: Number | None = None
+    base: Joint
+    platform: Joint
+    cylinder: Link | None = None
+    piston: Link | None = None
+
+
+SECTIONS = ("units", "dynamics", "load", "home", "tool", "published", "platform", "rods", "legs")
+
+# Which kind of quantity stands under a key, wherever in the file.
+KIND_OF_KEY = {
+    **dict.fromkeys(("point", "radius", "position", "center", "stroke"), "length"),
+    **dict.fromkeys(("angle", "rotation_vector"), "angle"),
+    **{kind: kind for kind in ("mass", "inertia", "force", "torque")},
+    "gravity": "acceleration",
+}
+
+
+# --- from the file to SI ------------------------------------------------------------------------------------
+
+
+def read_spec(data: dict[str, Any]) -> tuple[dict[str, Any], list[Fault]]:
+    """The SI description of a mechanism file's content `data`, and everything wrong with its form.
+
+    A part that cannot be read is None in the description (or its default), so that the core can still check
+    all others; the description stands for the file only if there are no faults.
+    """
+    units, faults = read_units(data.get("units", {}), set(_kinds(data)), MECHANISM_KINDS)
+    header = {key: value for key, value in data.items() if key in Header.model_fields}
+    keys = (*Header.model_fields, *SECTIONS)
+    faults += [Fault(key, f"is no key here; {alternatives(key, keys)}") for key in data if key not in keys]
+
+    head = read_table(Header, header, "", faults)
+    dynamics = read_table(Dynamics, data.get("dynamics", {}), "dynamics", faults) or Dynamics()
+    load = read_table(Load, data.get("load", {}), "load", faults) or Load()
+    tool = read_table(Tool, data.get("tool", {}), "tool", faults) or Tool()
+    home = read_table(Home, data["home"], "home", faults) if "home" in data else None
+    if "home" not in data:
+        faults.append(Fault("home", "is missing; needs the centre pose, such as position = [0, 0, 700]"))
+    if "published" in data:
+        read_table(Published, data["published"], "published", faults)
+    platform = read_table(Body, data["platform"], "platform", faults) if "platform" in data else None
+
+    rods = _list(data, "rods", faults)
+    legs = _list(data, "legs", faults)
+    rod_names = [rod.get("name") if isinstance(rod, dict) else None for rod in rods]
+    gravity = STANDARD_GRAVITY if dynamics.gravity is None else units.vector(dynamics.gravity, "acceleration")
+    spec = {
+        "name": head.name if head else "",
+        "platform": platform and _body(platform.mass, platform.center, platform.inertia, units),
+        "rods": [_rod(rod, f"rods.{i}", units, faults) for i, rod in enumerate(rods, 1)],
+        "legs": [_leg(leg, i, rod_names, units, faults) for i, leg in enumerate(legs, 1)],
+        "gravity": list(gravity),
+        "efficiency": dynamics.efficiency,
+        "linear_damping": dynamics.linear_damping,
+        "angular_damping": dynamics.angular_damping,
+        "load": {
+            "force": units.vector(load.force, "force"),
+            "torque": units.vector(load.torque, "torque"),
+            "axes": load.axes,
+        },
+        "home": home
+        and {
+            "position": units.vector(home.position, "length"),
+            "rotation_vector": units.vector(home.rotation_vector, "angle"),
+        },
+        "tool": {"point": _point(tool.point, units), "axis": _axis(tool.axis, units)},
+    }
+    return spec, faults
+
+
+def _kinds(data: object) -> Iterator[str]:
+    """Kinds of the quantities that occur anywhere in `data`."""
+    if isinstance(data, dict):
+        for key, value in data.items():
+            if key in KIND_OF_KEY:
+                yield KIND_OF_KEY[key]
+            yield from _kinds(value)
+    elif isinstance(data, (list, tuple)):
+        for value in data:
+            yield from _kinds(value)
+
+
+def _list(data: dict[str, Any], key: str, faults: list[Fault]) -> list[Any]:
+    value = data.get(key, [])
+    if not isinstance(value, (list, tuple)):
+        faults.append(Fault(key, f"is {shown(value)}; needs one table [[{key}]] for each"))
+        return []
+    return list(value)
+
+
+def _rod(data: object, place: str, units: Units, faults: list[Fault]) -> dict[str, Any] | None:
+    rod = read_table(Rod, data, place, faults)
+    absent = [key for key in Body.model_fields if isinstance(data, dict) and key not in data]
+    if len(absent) < len(Body.model_fields):
+        message = f"is missing; a body needs {', '.join(Body.model_fields)}"
+        faults += [Fault(f"{place}.{key}", message) for key in absent]
+    if rod is None:
+        return None
+    body = None
+    if rod.mass is not None and rod.center is not None and rod.inertia is not None:
+        body = _body(rod.mass, rod.center, rod.inertia, units)
+    return {
+        "name": rod.name,
+        "point": _point(rod.point, units),
+        "axis": _axis(rod.axis, units),
+        "body": body,
+    }
+
+
+def _leg(
+    data: object, number: int, rod_names: list[Any], units: Units, faults: list[Fault]
+) -> dict[str, Any] | None:
+    place = f"legs.{number}"
+    leg = read_table(Leg, data, place, faults)
+    if leg is None:
+        return None
+    base = _joint(leg.base, f"{place}.base", rod_names, units, faults)
+    platform = _joint(leg.platform, f"{place}.platform", None, units, faults)
+    if base is None or platform is None:
+        return None
+    return {
+        "name": str(number) if leg.name is None else leg.name,
+        "actuated": leg.actuated,
+        "stroke": leg.stroke and units.vector((leg.stroke.min, leg.stroke.max), "length"),
+        "radius": None if leg.radius is None else units.si(leg.radius, "length"),
+        "base": base,
+        "platform": platform,
+        "cylinder": leg.cylinder and _link(leg.cylinder, +1, units),
+        "piston": leg.piston and _link(leg.piston, -1, units),
+    }
+
+
+def _joint(
+    joint: Joint, place: str, rod_names: list[Any] | None, units: Units, faults: list[Fault]
+) -> dict[str, Any] | None:
+    """`rod_names` is None on the platform, which carries no rods. None where the rod is unknown."""
+    letter, axis, normal, rod = joint.joint, joint.axis, joint.normal, joint.rod
+    on_rod = letter == "R" and rod is not None and rod_names is not None
+    may_have = {"axis": letter != "S" and not on_rod, "normal": letter == "F"}
+    for key, value in {"axis": axis, "normal": normal}.items():
+        if may_have[key] and value is None:
+            faults.append(Fault(f"{place}.{key}", f"is missing; a {letter} joint needs it"))
+        if not may_have[key] and value is not None:
+            of = f"{letter} on a rod takes it from the rod" if on_rod else f"a {letter} joint has none"
+            faults.append(Fault(f"{place}.{key}", f"must not be given; {of}"))
+    if rod is not None and rod_names is None:
+        faults.append(Fault(f"{place}.rod", "a rod carries base joints only"))
+    elif rod is not None and letter != "R":
+        faults.append(Fault(f"{place}.joint", f"is {letter}; on a rod it must be R"))
+    if rod is not None and rod_names is not None and rod not in rod_names:
+        names = [name for name in rod_names if isinstance(name, str)]
+        faults.append(Fault(f"{place}.rod", f"is {shown(rod)}, no rod's name; {alternatives(rod, names)}"))
+        return None
+    return {
+        "joint": letter,
+        "point": _point(joint.point, units),
+        "axis": _axis(axis, units) if axis is not None and may_have["axis"] else None,
+        "normal": _axis(normal, units) if normal is not None and may_have["normal"] else None,
+        "rod": rod_names.index(rod) if on_rod and rod_names else None,
+        "cone": joint.cone
+        and {
+            "angle": units.si(joint.cone.angle, "angle"),
+            "axis": None if joint.cone.axis is None else _axis(joint.cone.axis, units),
+        },
+    }
+
+
+def _link(link: Link, sign: int, units: Units) -> dict[str, Any]:
+    """In leg axes (n, delta, n x delta); a distance goes along `sign` delta, from B to b or from b to B."""
+    center = link.center if isinstance(link.center, list) else [0.0, sign * link.center, 0.0]
+    return _body(link.mass, center, link.inertia, units)
+
+
+def _body(
+    mass: float, center: list[float], inertia: float | list[float] | list[list[float]], units: Units
+) -> dict[str, Any]:
+    given = np.array(inertia, dtype=float)
+    matrix = given if given.ndim == 2 else np.eye(3) * given
+    return {
+        "mass": units.si(mass, "mass"),
+        "center": units.vector(center, "length"),
+        "inertia": units.si(matrix, "inertia").tolist(),
+    }
+
+
+def _point(point: list[float] | PolarPoint, units: Units) -> list[float]:
+    if isinstance(point, list):
+        return units.vector(point, "length")
+    c, s = cos_sin(point.angle, units.of("angle"))
+    return units.vector((point.radius * c, point.radius * s, point.z), "length")
+
+
+def _axis(axis: list[float] | PolarAxis, units: Units) -> list[float]:
+    return axis if isinstance(axis, list) else [*cos_sin(axis.angle, units.of("angle")), axis.z]
+
+
+# --- reading one table --------------------------------------------------------------------------------------
+
+AnyTable = TypeVar("AnyTable", bound=Table)
+
+_TABLE_OF_KEY: dict[str, type[Table]] = {
+    "point": PolarPoint,
+    "axis": PolarAxis,
+    "normal": PolarAxis,
+    "stroke": Stroke,
+    "cone": Cone,
+    "base": Joint,
+    "platform": Joint,
+    "cylinder": Link,
+    "piston": Link,
+}
+_FORM_OF_KEY = {
+    "point": "[x, y, z] or { radius, angle, z }",
+    "axis": "[x, y, z] or { angle, z }",
+    "normal": "[x, y, z] or { angle, z }",
+    "center": "[x, y, z] (a distance will do in cylinder and piston)",
+    "inertia": "a number, [Ixx, Iyy, Izz] or three rows of three",
+}
+_NEEDED = {
+    "float_type": "a finite number",
+    "finite_number": "a finite number",
+    "int_type": "a whole number",
+    "bool_type": "true or false",
+    "string_type": "text in quotes",
+}
+
+
+def read_table(model: type[AnyTable], data: object, place: str, faults: list[Fault]) -> AnyTable | None:
+    """`data` as a `model`; what is wrong with it is added to `faults`.
+
+    Unknown keys and optional parts that cannot be read are then left out; None if what remains is not enough.
+    """
+    try:
+        return model.model_validate(data)
+    except ValidationError as error:
+        problems = error.errors(include_url=False)
+    wrong = set()
+    for problem in problems:
+        path = [part for part in problem["loc"] if not str(part).startswith("<")]
+        faults.append(Fault(_place(place, path), _message(model, path, dict(problem))))
+        if path and problem["type"] != "extra_forbidden":
+            wrong.add(path[0])
+    if not isinstance(data, dict):
+        return None
+    try:
+        rest = {key: value for key, value in data.items() if key not in wrong}
+        return model.model_validate(rest, extra="ignore")
+    except ValidationError:
+        return None
+
+
+def _place(section: str, path: list[int | str]) -> str:
+    """Dotted, list entries counted from 1."""
+    parts = [str(part + 1) if isinstance(part, int) else part for part in path]
+    return ".".join([section, *parts] if section else parts)
+
+
+def _message(model: type[Table], path: list[int | str], problem: dict[str, Any]) -> str:
+    """What was found and what would be valid."""
+    keys = [part for part in path if isinstance(part, str)]
+    match problem["type"]:
+        case "missing":
+            return f"is missing; needed here: {', '.join(_required(_table_at(model, keys[:-1])))}"
+        case "extra_forbidden":
+            return f"is no key here; {alternatives(keys[-1], _table_at(model, keys[:-1]).model_fields)}"
+        case "model_type":
+            needed = f"a table with {', '.join(_required(_table_at(model, keys)))}"
+        case "literal_error":
+            needed = str(problem["ctx"]["expected"]).replace("'", '"')
+        case "greater_than_equal":
+            needed = f"at least {problem['ctx']['ge']}"
+        case "too_short" | "too_long" | "list_type":
+            needed = _FORM_OF_KEY.get(keys[-1] if keys else "", "[x, y, z]")
+        case kind:
+            needed = _NEEDED.get(kind, problem["msg"])
+    return f"is {shown(problem['input'])}; needs {needed}"
+
+
+def _table_at(model: type[Table], keys: list[str]) -> type[Table]:
+    return _TABLE_OF_KEY[keys[-1]] if keys else model
+
+
+def _required(model: type[Table]) -> list[str]:
+    fields = model.model_fields
+    return [key for key in fields if fields[key].is_required()] or list(fields)

@@ -1,0 +1,247 @@
+"""A motion through a mechanism: every quantity of its kinematics and dynamics as one labelled dataset."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+from scipy.integrate import cumulative_simpson
+
+from polypod import _core
+from polypod.mechanism import Mechanism
+from polypod.motion import Motion
+from polypod.results import Solution
+from polypod.status import Status
+
+CHUNK = 20_000
+"""States solved between two reports of progress."""
+
+Array = NDArray[np.float64]
+
+_TIME, _LEG, _ROD = ("time",), ("time", "leg"), ("time", "rod")
+_LEG3, _ROD3, _SIX = ("time", "leg", "axis"), ("time", "rod", "axis"), ("time", "component")
+_PAIR = ("time", "leg", "joint_axis")
+
+# name → dimensions, unit, symbol, long name
+VARIABLES: dict[str, tuple[tuple[str, ...], str, str, str]] = {
+    "pose": (("time", "row", "column"), "1 and m", "", "pose of the platform, homogeneous matrix"),
+    "twist": (_SIX, "m/s and rad/s", "V", "velocity of o and angular velocity of the platform"),
+    "acceleration": (_SIX, "m/s^2 and rad/s^2", "A", "acceleration of o and angular acceleration of the platform"),
+    "length": (_LEG, "m", "r", "leg length"),
+    "rate": (_LEG, "m/s", "v_r", "leg rate"),
+    "leg_acceleration": (_LEG, "m/s^2", "a_r", "leg acceleration"),
+    "direction": (_LEG3, "1", "δ", "unit vector of the leg"),
+    "leg_omega": (_LEG3, "rad/s", "ω_r", "angular velocity of the leg"),
+    "leg_eps": (_LEG3, "rad/s^2", "ε_r", "angular acceleration of the leg"),
+    "leg_spin": (_LEG, "rad/s", "s", "spin of the leg about its line"),
+    "leg_spin_rate": (_LEG, "rad/s^2", "s'", "rate of the leg's spin"),
+    "piston_velocity": (_LEG3, "m/s", "v_p", "velocity of the piston's mass centre"),
+    "piston_acceleration": (_LEG3, "m/s^2", "a_p", "acceleration of the piston's mass centre"),
+    "cylinder_velocity": (_LEG3, "m/s", "v_q", "velocity of the cylinder's mass centre"),
+    "cylinder_acceleration": (_LEG3, "m/s^2", "a_q", "acceleration of the cylinder's mass centre"),
+    "base_joint_angle": (_PAIR, "rad", "ψ", "angles of the base joint since home"),
+    "base_joint_rate": (_PAIR, "rad/s", "ψ'", "rates of the base joint"),
+    "platform_joint_angle": (_PAIR, "rad", "φ", "angles of the platform joint since home"),
+    "platform_joint_rate": (_PAIR, "rad/s", "φ'", "rates of the platform joint"),
+    "base_cone_angle": (_LEG, "rad", "", "angle between leg and cone axis of the base joint"),
+    "platform_cone_angle": (_LEG, "rad", "", "angle between leg and cone axis of the platform joint"),
+    "rod_angle": (_ROD, "rad", "", "turn of the rod about its line since home"),
+    "rod_omega": (_ROD3, "rad/s", "ω_L", "angular velocity of the rod"),
+    "rod_eps": (_ROD3, "rad/s^2", "ε_L", "angular acceleration of the rod"),
+    "wrench": (_SIX, "N and N m", "(F_o, T_o)", "load on the platform at o, in its own axes"),
+    "force": (_LEG, "N", "f_a", "active force of the leg"),
+    "constraint": (("time", "constraint"), "N or N m", "f_c", "multiplier of the constraint"),
+    "coupled_force": (("time", "coupled_leg"), "N", "f_c1, f_c3", "couple-constrained force"),
+    "coupled_torque": (_TIME, "N m", "T_c", "couple-constrained torque on the rod"),
+    "coupled_force_as_printed": (("time", "coupled_leg"), "N", "f_c1, f_c3", "couple-constrained force by Eq. 44 as printed"),
+    "coupled_torque_as_printed": (_TIME, "N m", "T_c", "couple-constrained torque by Eq. 44 as printed"),
+    "kinetic_energy": (_TIME, "J", "K", "kinetic energy"),
+    "potential_energy": (_TIME, "J", "P", "potential energy"),
+    "actuator_power": (_TIME, "W", "", "power of the actuators"),
+    "load_power": (_TIME, "W", "", "power of the load"),
+    "damping_power": (_TIME, "W", "", "power of the damping"),
+    "friction_power": (_TIME, "W", "", "power that the efficiency stands for"),
+    "power_residual": (_TIME, "W", "", "what is left of the power balance"),
+    "actuator_work": (_TIME, "J", "", "work of the actuators since the start"),
+    "sigma_min": (_TIME, "1", "σ_min", "smallest singular value of the leg Jacobian"),
+    "condition": (_TIME, "1", "", "condition number of the leg Jacobian"),
+}
+_LENGTHS = {"x", "y", "z", "p", "h", "tip_x", "tip_y", "tip_z"}
+_PURE = {"axis_x", "axis_y", "axis_z"}
+_SYMBOLS = {"alpha": "α", "beta": "β", "gamma": "γ", "x": "X_o", "y": "Y_o", "z": "Z_o"}
+
+
+def solve(mech: Mechanism, motion: Motion, *, progress: Callable[[int, int], None] | None = None) -> Solution:
+    """Kinematics, inverse dynamics, power and conditioning along a motion.
+
+    Args:
+        mech: the mechanism.
+        motion: its motion; its own load, where it has one, stands for the mechanism's.
+        progress: called now and then with the number of states done and the number of all.
+
+    Returns:
+        A `Solution`, whose dataset has one variable for each quantity, SI, and the `Status` of every state.
+    """
+    total, parts, guess = len(motion.time), [], None
+    for start in range(0, total, CHUNK):
+        chunk = slice(start, min(start + CHUNK, total))
+        values, last = _solve_chunk(mech, motion, chunk, guess)
+        guess = guess if last is None else last
+        parts.append(values)
+        if progress is not None:
+            progress(chunk.stop, total)
+    values = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+    # Simpson's rule through the states that have a power; before the first gap only.
+    power = values["actuator_power"]
+    known = int(np.argmax(~np.isfinite(power))) if not np.isfinite(power).all() else total
+    values["actuator_work"] = np.full(total, np.nan)
+    if known > 2:
+        values["actuator_work"][:known] = cumulative_simpson(power[:known], x=motion.time[:known], initial=0.0)
+    return Solution(_dataset(mech, motion, values))
+
+
+def _solve_chunk(
+    mech: Mechanism, motion: Motion, chunk: slice, guess: Array | None
+) -> tuple[dict[str, NDArray[Any]], Array | None]:
+    """All variables of some states, and the last pose that was found, to start the next ones from."""
+
+    def cut(series: dict[str, Array]) -> dict[str, Array]:
+        return {name: values[chunk] for name, values in series.items()}
+
+    state = mech.state(
+        cut(motion.coordinates),
+        cut(motion.rates),
+        cut(motion.second_rates),
+        branch=motion.branch,
+        guess=guess,
+        continued=True,
+    )
+    pose, twist, acceleration = state.pose, state.twist, state.acceleration
+    kin = mech.kinematics(pose, twist, acceleration)
+    wrench = None if motion.wrench is None else motion.wrench[chunk]
+    own = mech.geometry["load"]
+    loads = np.broadcast_to([*own["force"], *own["torque"]], twist.shape) if wrench is None else wrench
+    load = (wrench, motion.wrench_axes)
+    dynamics = mech.inverse_dynamics(pose, twist, acceleration, *load)
+    power = mech.power(pose, twist, acceleration, *load)
+    conditioning = mech.conditioning(pose)
+    # The first thing that went wrong explains the rest.
+    status = np.where(state.status != Status.OK, state.status, dynamics.status)
+    values: dict[str, NDArray[Any]] = {
+        "pose": pose,
+        "twist": twist,
+        "acceleration": acceleration,
+        "length": kin.lengths,
+        "rate": kin.rates,
+        "leg_acceleration": kin.accelerations,
+        "direction": kin.directions,
+        "leg_omega": kin.leg_omega,
+        "leg_eps": kin.leg_eps,
+        "leg_spin": kin.leg_spin,
+        "leg_spin_rate": kin.leg_spin_rate,
+        "piston_velocity": kin.piston_velocity,
+        "piston_acceleration": kin.piston_acceleration,
+        "cylinder_velocity": kin.cylinder_velocity,
+        "cylinder_acceleration": kin.cylinder_acceleration,
+        "base_joint_angle": kin.base_joint_angles,
+        "base_joint_rate": kin.base_joint_rates,
+        "platform_joint_angle": kin.platform_joint_angles,
+        "platform_joint_rate": kin.platform_joint_rates,
+        "base_cone_angle": kin.base_cone_angle,
+        "platform_cone_angle": kin.platform_cone_angle,
+        "rod_angle": kin.rod_angle,
+        "rod_omega": kin.rod_omega,
+        "rod_eps": kin.rod_eps,
+        "wrench": loads,
+        "force": dynamics.forces,
+        "constraint": dynamics.constraint,
+        "kinetic_energy": power.kinetic,
+        "potential_energy": power.potential,
+        "actuator_power": power.actuators,
+        "load_power": power.load,
+        "damping_power": power.damping,
+        "friction_power": power.friction,
+        "power_residual": power.residual,
+        "sigma_min": conditioning.sigma_min,
+        "condition": conditioning.condition,
+        "status": status.astype(np.int8),
+    }
+    for suffix, as_printed in (("", False), ("_as_printed", True)) if mech.coupled_legs else ():
+        coupled = mech.coupled_forces(pose, dynamics.constraint, as_printed=as_printed)
+        values[f"coupled_force{suffix}"] = coupled.forces
+        values[f"coupled_torque{suffix}"] = coupled.torque
+    for prefix, series in (
+        ("coordinate_", state.coordinates),
+        ("coordinate_rate_", state.coordinate_rates),
+        ("coordinate_second_rate_", state.coordinate_second_rates),
+    ):
+        values |= {prefix + name: column for name, column in series.items()}
+    found = np.flatnonzero(np.isfinite(pose).all(axis=(1, 2)))
+    return values, pose[found[-1]] if len(found) else None
+
+
+def _dataset(mech: Mechanism, motion: Motion, values: dict[str, NDArray[Any]]) -> xr.Dataset:
+    """The variables with their dimensions, units, names and the inputs that they came from."""
+    data: dict[str, Any] = {}
+    for name, array in values.items():
+        if name == "status":
+            meanings = " ".join(s.name for s in Status)
+            attrs = {"long_name": "outcome of the state", "flag_values": [int(s) for s in Status], "flag_meanings": meanings}
+            data[name] = (_TIME, array, attrs)
+        elif name.startswith("coordinate_"):
+            data[name] = (_TIME, array, _coordinate_attributes(name))
+        else:
+            dims, unit, symbol, long_name = VARIABLES[name]
+            data[name] = (dims, array, {"units": unit, "symbol": symbol, "long_name": long_name})
+    mobility = mech.mobility()
+    rows = [mobility.constraint_rows[i] for i in mobility.independent_rows]
+    coords: dict[str, Any] = {
+        "time": (_TIME, motion.time, {"units": "s", "symbol": "t", "long_name": "time"}),
+        "leg": list(mech.leg_names),
+        "axis": ["x", "y", "z"],
+        "component": ["linear x", "linear y", "linear z", "angular x", "angular y", "angular z"],
+        "joint_axis": ["body", "leg"],
+        "row": [0, 1, 2, 3],
+        "column": [0, 1, 2, 3],
+        "rod": list(mech.rod_names),
+        "constraint_row": ("constraint", [f"{kind} of leg {leg}" for leg, kind in rows]),
+    }
+    if mech.coupled_legs:
+        coords["coupled_leg"] = list(mech.coupled_legs)
+    coords = {name: value for name, value in coords.items() if _used(name, value, data)}
+    attrs = {
+        "title": f"{mech.name} along {motion.name}",
+        "mechanism": mech.name,
+        "mechanism_file": mech.to_toml(),
+        "motion": motion.name,
+        "coordinate_set": motion.set,
+        "branch": motion.branch,
+        "wrench_axes": mech.geometry["load"]["axes"] if motion.wrench is None else motion.wrench_axes,
+        "polypod_version": _core.__version__,
+    }
+    # A mechanism without rods or constraints has no such variables.
+    data = {name: variable for name, variable in data.items() if 0 not in variable[1].shape[1:]}
+    return xr.Dataset(data, coords, attrs)
+
+
+def _used(name: str, value: Any, data: dict[str, Any]) -> bool:
+    """Whether a coordinate has a dimension of some size that a variable uses."""
+    dim = value[0] if isinstance(value, tuple) else name
+    dim = dim if isinstance(dim, str) else dim[0]
+    return any(dim in variable[0] and 0 not in variable[1].shape[1:] for variable in data.values())
+
+
+def _coordinate_attributes(name: str) -> dict[str, str]:
+    """Unit and names of a variable such as coordinate_rate_alpha."""
+    for prefix, order, per in (("coordinate_second_rate_", "second rate of ", "/s^2"), ("coordinate_rate_", "rate of ", "/s")):
+        if name.startswith(prefix):
+            base, before, after = name.removeprefix(prefix), order, per
+            break
+    else:
+        base, before, after = name.removeprefix("coordinate_"), "", ""
+    unit = "m" if base in _LENGTHS else "1" if base in _PURE else "rad"
+    symbol = _SYMBOLS.get(base, base) + "'" * {"": 0, "/s": 1, "/s^2": 2}[after]
+    return {"units": unit + after, "symbol": symbol, "long_name": f"{before}coordinate {base}"}

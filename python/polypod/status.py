@@ -1,0 +1,40 @@
+"""The outcome of each state of a batch."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from enum import IntEnum
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from polypod import _core
+
+
+class Status(IntEnum):
+    """What became of a state. A batch never raises for a numerical outcome; results hold NaN where there is none."""
+
+    OK = 0
+    NO_BRANCH = 1
+    FOLD = 2
+    NOT_CONVERGED = 3
+    SINGULAR = 4
+    OUT_OF_STROKE = 5
+    OFF_CONSTRAINT = 6
+    INVALID_INPUT = 7
+
+    @property
+    def message(self) -> str:
+        """What it means and what helps."""
+        return _MESSAGES[self]
+
+
+_MESSAGES = {code: message for code, _, message in _core.statuses()}
+
+
+def count(status: ArrayLike) -> Iterator[tuple[Status, int, int]]:
+    """For each outcome other than OK: the status, how many states have it, and the index of the first of them."""
+    codes = np.asarray(status).ravel()
+    for code in np.unique(codes[codes != Status.OK]):
+        where = np.flatnonzero(codes == code)
+        yield Status(int(code)), len(where), int(where[0])

@@ -1,0 +1,104 @@
+"""The units that files may use, and their way to SI. Inside Polypod everything is SI and radians."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Iterable
+from dataclasses import dataclass
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from polypod.errors import Fault, UnknownNameError, alternatives, shown
+
+Number = TypeVar("Number", float, NDArray[np.float64])
+
+# kind → unit → (n, d), one unit being n/d of the SI unit, which comes first. The pair keeps both numbers
+# exact, so that 270 mm becomes the very 0.27 that one would write in metres.
+UNITS: dict[str, dict[str, tuple[float, float]]] = {
+    "length": {"m": (1, 1), "mm": (1, 1000), "cm": (1, 100), "um": (1, 10**6), "in": (127, 5000)},
+    "angle": {"rad": (1, 1), "deg": (math.pi, 180)},
+    "time": {"s": (1, 1), "ms": (1, 1000)},
+    "mass": {"kg": (1, 1), "g": (1, 1000), "lb": (45359237, 10**8)},
+    "inertia": {"kg m^2": (1, 1), "kg mm^2": (1, 10**6), "g mm^2": (1, 10**9)},
+    "force": {"N": (1, 1), "kN": (1000, 1), "mN": (1, 1000)},
+    "torque": {"N m": (1, 1), "N mm": (1, 1000), "kN m": (1000, 1)},
+    "acceleration": {"m/s^2": (1, 1), "mm/s^2": (1, 1000)},
+}
+MECHANISM_KINDS = ("length", "angle", "mass", "inertia", "force", "torque", "acceleration")
+MOTION_KINDS = ("time", "length", "angle", "force", "torque")
+
+
+def si_unit(kind: str) -> str:
+    """The SI unit of a kind of quantity."""
+    return next(iter(UNITS[kind]))
+
+
+def to_si(value: Number, kind: str, unit: str) -> Number:
+    """`value`, a number or an array in `unit`, in SI.
+
+    Raises UnknownNameError for a unit that is not of this kind.
+    """
+    n, d = _ratio(kind, unit)
+    return value * n / d
+
+
+def from_si(value: Number, kind: str, unit: str) -> Number:
+    """The inverse of `to_si`, up to rounding."""
+    n, d = _ratio(kind, unit)
+    return value * d / n
+
+
+def cos_sin(angle: float, unit: str) -> tuple[float, float]:
+    """Cosine and sine; from degrees exact at multiples of 90 and exactly symmetric about them."""
+    if unit != "deg":
+        angle = to_si(angle, "angle", unit)
+        return math.cos(angle), math.sin(angle)
+    quarters = round(angle / 90)
+    rest = math.radians(angle - 90 * quarters)
+    c, s = math.cos(rest), math.sin(rest)
+    return [(c, s), (0.0 - s, c), (-c, 0.0 - s), (s, -c)][quarters % 4]  # 0.0 - s: never -0.0
+
+
+def _ratio(kind: str, unit: str) -> tuple[float, float]:
+    if unit not in UNITS[kind]:
+        raise UnknownNameError(f"unit of {kind}", unit, UNITS[kind])
+    return UNITS[kind][unit]
+
+
+@dataclass(frozen=True)
+class Units:
+    """A file's choice of units, kind → unit; SI where it makes none."""
+
+    chosen: dict[str, str]
+
+    def of(self, kind: str) -> str:
+        return self.chosen.get(kind, si_unit(kind))
+
+    def si(self, value: Number, kind: str) -> Number:
+        return to_si(value, kind, self.of(kind))
+
+    def vector(self, values: Iterable[float], kind: str) -> list[float]:
+        return [self.si(value, kind) for value in values]
+
+
+def read_units(table: object, used: Collection[str], kinds: Collection[str]) -> tuple[Units, list[Fault]]:
+    """A file's `[units]` and what is wrong with it; kinds that are wrong or missing fall back to SI.
+
+    `used` are the kinds of quantity in the file, which need a unit; `kinds` those that may have one.
+    """
+    if not isinstance(table, dict):
+        return Units({}), [Fault("units", f'is {shown(table)}; must be a table such as length = "mm"')]
+    chosen, faults = {}, []
+    for kind, unit in table.items():
+        if kind not in kinds:
+            faults.append(Fault(f"units.{kind}", f"is no kind of quantity here; {alternatives(kind, kinds)}"))
+        elif not isinstance(unit, str) or unit not in UNITS[kind]:
+            faults.append(Fault(f"units.{kind}", f"is {shown(unit)}; {alternatives(str(unit), UNITS[kind])}"))
+        else:
+            chosen[kind] = unit
+    for kind in kinds:
+        if kind in used and kind not in table:
+            faults.append(Fault(f"units.{kind}", f"is missing; {alternatives('', UNITS[kind])}"))
+    return Units(chosen), faults
