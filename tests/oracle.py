@@ -290,7 +290,9 @@ def read(d: dict) -> dict:
             {
                 "name": leg.get("name", str(i + 1)),
                 "actuated": leg.get("actuated", True),
-                "stroke": [v * length for v in (leg["stroke"]["min"], leg["stroke"]["max"])] if "stroke" in leg else None,
+                "stroke": [v * length for v in (leg["stroke"]["min"], leg["stroke"]["max"])]
+                if "stroke" in leg
+                else None,
                 "base": joint(leg["base"]),
                 "platform": joint(leg["platform"]),
                 "cylinder": body(leg.get("cylinder"), along_leg=1),
@@ -337,11 +339,20 @@ def lu() -> dict:
         piston = {"mass": 3, "center": 100 if on_rod else 98, "inertia": 3}
         cylinder = {"mass": 2, "center": 50, "inertia": 2}
         stroke = {"min": 650, "max": 850}
-        legs.append({"base": base, "platform": platform, "piston": piston, "cylinder": cylinder, "stroke": stroke})
+        legs.append(
+            {"base": base, "platform": platform, "piston": piston, "cylinder": cylinder, "stroke": stroke}
+        )
     s18 = math.sin(math.radians(18))
     return {
         "name": "lu-3spu-2rpu-r",
-        "units": {"length": "mm", "angle": "deg", "mass": "kg", "inertia": "kg m^2", "force": "N", "torque": "N m"},
+        "units": {
+            "length": "mm",
+            "angle": "deg",
+            "mass": "kg",
+            "inertia": "kg m^2",
+            "force": "N",
+            "torque": "N m",
+        },
         "load": {"force": [10, 10, 500], "torque": [0, 0, 1000]},
         "home": {"position": [0, 120 * s18, 740]},
         "platform": {"mass": 3, "inertia": 5},
@@ -522,47 +533,60 @@ def characteristic_length(spec) -> float:
     return math.sqrt(np.mean([np.sum(leg["platform"]["point"] ** 2) for leg in spec["legs"]]))
 
 
-# Singular values of the scaled closure gradient below this share of the largest are zero.
+# Singular values of the scaled closure gradient below this share of the largest, or of 1 1/m, are zero.
 RANK_TOLERANCE = 1e-7
 
 
-def feasible_directions(spec, pose):
-    """An orthonormal basis (6, dof) of the twists (v, Λω) that keep the joints closed, at one pose."""
+def closure_gradient(spec, pose):
+    """Gradient (..., k, 6) of the residuals on scaled twists (v, Λω), and the scale (6,) of a twist."""
     scale = np.array([1, 1, 1] + [characteristic_length(spec)] * 3)
-    C = gradient(lambda p: residuals(spec, p), pose) / scale
+    return gradient(lambda p: residuals(spec, p), pose) / scale, scale
+
+
+def feasible_directions(spec, pose):
+    """A basis (..., 6, dof) of the twists that keep the joints closed, orthonormal as (v, Λω), and the scale."""
+    C, scale = closure_gradient(spec, pose)
     _, s, Vt = np.linalg.svd(C)
-    rank = int(np.sum(s > RANK_TOLERANCE * max(s[0], 1e-300)))
-    return Vt[rank:].T, scale
+    ranks = np.sum(s > RANK_TOLERANCE * np.maximum(s[..., :1], 1), axis=-1)
+    rank = int(np.max(ranks))
+    assert np.all(ranks == rank), "the poses of one batch have one mobility"
+    return np.swapaxes(Vt[..., rank:, :], -1, -2), scale
 
 
 def dof(spec, pose) -> int:
-    return feasible_directions(spec, pose)[0].shape[1]
+    return feasible_directions(spec, pose)[0].shape[-1]
 
 
-def close(spec, pose, iterations=12):
-    """The pose nearby at which all joints close: Newton's method with the least step. One pose."""
+def times(A, x):
+    """A x for stacks of matrices and vectors."""
+    return np.einsum("...ij,...j->...i", A, x)
+
+
+def close(spec, pose, iterations=25):
+    """The poses nearby at which all joints close: Newton's method with the least step, 0.1 m or rad at most."""
     R, o = np.array(pose[0], float), np.array(pose[1], float)
-    scale = np.array([1, 1, 1] + [characteristic_length(spec)] * 3)
     for _ in range(iterations):
         g = residuals(spec, (R, o)).x
         if np.max(np.abs(g)) < 1e-16:
             break
-        step = -np.linalg.pinv(gradient(lambda p: residuals(spec, p), (R, o)) / scale, rcond=RANK_TOLERANCE) @ g / scale
-        R, o = turn(step[3:]) @ R, o + step[:3]
+        C, scale = closure_gradient(spec, (R, o))
+        step = -times(np.linalg.pinv(C, rcond=RANK_TOLERANCE), g) / scale
+        step *= np.minimum(1, 0.1 / np.maximum(np.linalg.norm(step, axis=-1, keepdims=True), 0.1))
+        R, o = turn(step[..., 3:]) @ R, o + step[..., :3]
         U, _, Vt = np.linalg.svd(R)
         R = U @ Vt
     return R, o
 
 
 def feasible_motion(spec, pose, q, q2):
-    """Twist and acceleration (6,) that keep the joints closed, from free numbers q, q2 (6,) of which dof are used."""
+    """Twist and acceleration (..., 6) that keep the joints closed, from free numbers (..., 6); dof are used."""
     Z, scale = feasible_directions(spec, pose)
-    k = Z.shape[1]
-    twist = Z @ q[:k] / scale
+    k = Z.shape[-1]
+    twist = times(Z, q[..., :k]) / scale
     g2 = residuals(spec, moving(pose, twist)).dd
-    C = gradient(lambda p: residuals(spec, p), pose) / scale
-    acceleration = (-np.linalg.pinv(C, rcond=RANK_TOLERANCE) @ g2 + Z @ q2[:k]) / scale
-    return twist, acceleration
+    C, _ = closure_gradient(spec, pose)
+    back = times(np.linalg.pinv(C, rcond=RANK_TOLERANCE), g2)
+    return twist, (times(Z, q2[..., :k]) - back) / scale
 
 
 # ---------------------------------------------------------------------------------------------------------------
@@ -620,27 +644,31 @@ def lengths(spec, pose) -> Jet:
     return concat([at.length for at in legs_at(spec, pose)])
 
 
+def leg_gradient(spec, pose):
+    """Gradient (..., n, 6) of the actuated legs' lengths."""
+    return gradient(lambda p: lengths(spec, p), pose)[..., actuated(spec), :]
+
+
 def active_forces(spec, pose, twist, acceleration, wrench=None, axes="base"):
-    """Forces of the actuated legs at one pose, by virtual work on independent feasible directions only."""
+    """Forces (..., n) of the actuated legs, by virtual work on independent feasible directions only."""
     W, _ = generalised_force(spec, pose, twist, acceleration, wrench, axes)
     Z, scale = feasible_directions(spec, pose)
-    Z = Z / scale[:, None]
-    Jl = gradient(lambda p: lengths(spec, p), pose)[actuated(spec)]
-    return np.linalg.solve((Jl @ Z).T, -Z.T @ W)
+    Zt = np.swapaxes(Z, -1, -2) / scale
+    columns_ = Zt @ np.swapaxes(leg_gradient(spec, pose), -1, -2)
+    return np.linalg.solve(columns_, -times(Zt, W)[..., None])[..., 0]
 
 
 def reaction_wrench(spec, pose, twist, acceleration, wrench=None, axes="base"):
-    """The wrench of all constraints on the platform: what actuators and given forces leave over. One pose."""
+    """The wrench (..., 6) of all constraints on the platform: what actuators and given forces leave over."""
     W, _ = generalised_force(spec, pose, twist, acceleration, wrench, axes)
-    Jl = gradient(lambda p: lengths(spec, p), pose)[actuated(spec)]
-    return -W - Jl.T @ active_forces(spec, pose, twist, acceleration, wrench, axes)
+    f = active_forces(spec, pose, twist, acceleration, wrench, axes)
+    return -W - times(np.swapaxes(leg_gradient(spec, pose), -1, -2), f)
 
 
 def conditioning(spec, pose):
     """Singular values, largest first, of the actuated legs' rates on the feasible unit twists (v, Λω)."""
     Z, scale = feasible_directions(spec, pose)
-    Jl = gradient(lambda p: lengths(spec, p), pose)[actuated(spec)] / scale
-    return np.linalg.svd(Jl @ Z, compute_uv=False)
+    return np.linalg.svd(leg_gradient(spec, pose) / scale @ Z, compute_uv=False)
 
 
 def energy(spec, pose, twist, acceleration):
@@ -699,7 +727,9 @@ def mobility(spec, pose) -> Mobility:
             chain_.append((rod_joint[rod], screw(at.base_axis, B)))
         for side, point in (("base", B), ("platform", b)):
             kind = leg[side]["joint"]
-            axis = at.base_axis if side == "base" else None if at.platform_axis is None else at.platform_axis.x
+            axis = (
+                at.base_axis if side == "base" else None if at.platform_axis is None else at.platform_axis.x
+            )
             axes = {"S": list(np.eye(3)), "U": [axis, n], "R": [n], "F": []}[kind]
             for a in axes:
                 chain_.append((count, screw(a, point)))
@@ -866,12 +896,7 @@ def eq16(e1, r1, l, L=LU_L):
     """Q and Q1 of c' = -Q ω and τ' = -Qᵀ v + Q1 ω. The last line as printed (the one above it has a slip of sign)."""
     s = skew
     Q = s(L) @ s(l)
-    Q1 = (
-        s(np.cross(L, l)) @ s(e1)
-        - s(e1) @ s(L) @ s(l)
-        - s(np.cross(L, r1)) @ s(l)
-        + s(l) @ s(L) @ s(e1)
-    )
+    Q1 = s(np.cross(L, l)) @ s(e1) - s(e1) @ s(L) @ s(l) - s(np.cross(L, r1)) @ s(l) + s(l) @ s(L) @ s(e1)
     return Q, Q1
 
 
@@ -1079,13 +1104,20 @@ def eq44(r1, r3, c1, f_c, L=LU_L):
     return f_c1, f_c - f_c1, np.cross(r1, f_c1 * c1)
 
 
-def coupled_forces(r1, r3, ll, f_c, L=LU_L):
-    """f_c1, f_c3 along c1 = r1×L/|r1×L| from the balance of a massless rod about L. ll is the vector b3b1.
+def coupled_forces(e1, e3, r1, r3, l, f_c, L=LU_L):
+    """f_c1, f_c3 along c1 = r1×L/|r1×L|, from statics alone: at b1 and b3 they are the wrench f_c (c, τ).
 
-    Both forces together are the wrench f_c (c, τ) with c = L×l, and their moments about L cancel. Where l is
-    along L their sum vanishes; the moment about the line through b3 that is square to L then fixes them.
+    Six equations for two unknowns; that they hold is what Eq. 7-11 say. Returns the forces and what is left over.
     """
     c1 = np.cross(r1, L) / np.linalg.norm(np.cross(r1, L))
-    d1, d3 = np.cross(r1, L) @ c1, np.cross(r3, L) @ c1
-    length = np.linalg.norm(ll)
-    return f_c * d3 / length, -f_c * d1 / length, c1, d1, d3
+    A = np.array([np.concatenate([c1, np.cross(e, c1)]) for e in (e1, e3)]).T
+    wrench = f_c * np.concatenate(eq11(e1, r1, l, L))
+    forces = np.linalg.lstsq(A, wrench, rcond=None)[0]
+    return forces, A @ forces - wrench
+
+
+def coupled_forces_of_the_notes(r1, r3, ll, f_c, L=LU_L):
+    """f_c1, f_c3 from the massless rod's balance about L, and the torque on the rod. ll is the vector b3b1."""
+    c1 = np.cross(r1, L) / np.linalg.norm(np.cross(r1, L))
+    d1, d3, length = np.cross(r1, L) @ c1, np.cross(r3, L) @ c1, np.linalg.norm(ll)
+    return np.array([f_c * d3 / length, -f_c * d1 / length]), f_c * d3 / length * d1

@@ -16,6 +16,8 @@ from polypod.units import MECHANISM_KINDS, UNITS, cos_sin, from_si, si_unit, to_
 
 BUILT_IN = Path(__file__).parents[1] / "python/polypod/mechanisms"
 DATA = Path(__file__).parent / "data"
+X = [1.0, 0.0, 0.0]
+ON_ROD = {"joint": "R", "rod": "L"}
 FILES = [*BUILT_IN.glob("*.toml"), *DATA.glob("*.toml")]
 
 
@@ -45,7 +47,7 @@ def leg_lengths(spec: dict[str, Any]) -> list[float]:
     return [math.dist(o + leg["platform"]["point"], leg["base"]["point"]) for leg in spec["legs"]]
 
 
-# --- sound files ---------------------------------------------------------------------------------------------
+# --- sound files --------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
@@ -98,17 +100,17 @@ def test_defaults() -> None:
 
 
 def test_vectors_and_matrices_in_bodies(paper: dict[str, Any]) -> None:
-    inertia = [[2, 0.1, 0], [0.1, 3, 0], [0, 0, 4]]
+    inertia = [[2, 0.5, 0], [0.5, 3, 0], [0, 0, 4]]
     paper["legs"][0]["cylinder"] = {"mass": 1, "center": [1, 2, 3], "inertia": inertia}
     paper["legs"][0]["piston"]["inertia"] = [1, 2, 3]
     paper["units"]["inertia"] = "kg mm^2"
     leg = read_spec(paper)[0]["legs"][0]
     assert leg["cylinder"]["center"] == [0.001, 0.002, 0.003]
-    assert leg["cylinder"]["inertia"] == [[2e-6, 1e-7, 0], [1e-7, 3e-6, 0], [0, 0, 4e-6]]
+    assert leg["cylinder"]["inertia"] == [[2e-6, 5e-7, 0], [5e-7, 3e-6, 0], [0, 0, 4e-6]]
     assert leg["piston"]["inertia"] == [[1e-6, 0, 0], [0, 2e-6, 0], [0, 0, 3e-6]]
 
 
-# --- units ---------------------------------------------------------------------------------------------------
+# --- units --------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -183,7 +185,7 @@ def test_a_unit_that_is_no_text(paper: dict[str, Any], value: object) -> None:
     assert "units" in places(paper)[0]
 
 
-# --- faults --------------------------------------------------------------------------------------------------
+# --- faults -------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -261,17 +263,19 @@ def test_an_unknown_key_is_named_and_the_rest_used(
 @pytest.mark.parametrize(
     ("side", "joint", "expected"),
     [
-        ("base", {"joint": "S", "axis": [1, 0, 0]}, {"axis": "must not be given; a S joint has none"}),
+        ("base", {"joint": "S", "axis": X}, {"axis": "must not be given; a S joint has none"}),
         ("base", {"joint": "U"}, {"axis": "is missing; a U joint needs it"}),
         ("base", {"joint": "R"}, {"axis": "is missing; a R joint needs it"}),
-        ("base", {"joint": "R", "rod": "L", "axis": [1, 0, 0]}, {"axis": "must not be given; R on a rod takes it from the rod"}),
-        ("base", {"joint": "U", "rod": "L", "axis": [1, 0, 0]}, {"joint": "is U; on a rod it must be R"}),
-        ("platform", {"joint": "R", "rod": "L", "axis": [1, 0, 0]}, {"rod": "a rod carries base joints only"}),
-        ("base", {"joint": "F"}, {"axis": "is missing; a F joint needs it", "normal": "is missing; a F joint needs it"}),
-        ("base", {"joint": "U", "axis": [1, 0, 0], "normal": [0, 1, 0]}, {"normal": "must not be given; a U joint has none"}),
-        ("platform", {"joint": "F", "axis": [0, 0, 1], "normal": {"angle": 0}}, {}),
+        ("base", {"joint": "F", "normal": X}, {"axis": "is missing; a F joint needs it"}),
+        ("base", {"joint": "F", "axis": X}, {"normal": "is missing; a F joint needs it"}),
+        ("base", {"joint": "U", "axis": X, "normal": X}, {"normal": "must not be given; a U joint has none"}),
+        ("base", ON_ROD | {"axis": X}, {"axis": "must not be given; R on a rod takes it from the rod"}),
+        ("base", ON_ROD | {"joint": "U", "axis": X}, {"joint": "is U; on a rod it must be R"}),
+        ("platform", ON_ROD | {"axis": X}, {"rod": "a rod carries base joints only"}),
+        ("platform", {"joint": "F", "axis": X, "normal": {"angle": 90}}, {}),
+        ("base", ON_ROD, {}),
     ],
-)  # fmt: skip
+)
 def test_what_a_joint_has(
     paper: dict[str, Any], side: str, joint: dict[str, Any], expected: dict[str, str]
 ) -> None:
@@ -322,7 +326,7 @@ def test_nothing_but_wrong_sections() -> None:
     assert set(places({"name": "a"} | dict.fromkeys(keys, 3))) == set(keys)
 
 
-# --- errors --------------------------------------------------------------------------------------------------
+# --- errors -------------------------------------------------------------------------------------------------
 
 
 def test_an_error_lists_each_fault_once() -> None:

@@ -1,8 +1,8 @@
 """Polypod analyses parallel manipulators on telescopic legs.
 
-SI units and radians in every array; six-vectors are linear part first, at the platform's point o, in base axes;
-poses are homogeneous matrices `(..., 4, 4)`; leading axes are a batch. Legs are numbered from 1 in files and from
-0 in arrays.
+SI units and radians in every array; six-vectors are linear part first, at the platform's point o, in base
+axes; poses are homogeneous matrices `(..., 4, 4)`; leading axes are a batch. Legs are numbered from 1 in
+files and from 0 in arrays.
 """
 
 from polypod import errors

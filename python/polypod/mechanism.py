@@ -1,4 +1,4 @@
-"""The mechanism and everything that can be asked of it. The equations are the core's; here are shapes and names."""
+"""The mechanism and all that can be asked of it. The equations are the core's; here are shapes and names."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from polypod.schema import read_spec
 Array = NDArray[np.float64]
 Codes = NDArray[np.uint8]
 
-NEAR_SINGULAR = 0.02
+NEAR_SINGULAR = 0.01
 """Smallest singular value (a pure number) below which a pose is called nearly singular."""
 
 
@@ -71,10 +71,10 @@ class Kinematics(NamedTuple):
     cylinder_velocity: Array
     cylinder_acceleration: Array
     base_joint_angles: Array
-    """(..., n, 2): leg against base, zero at home: about the axis in the base, then about n; NaN where none."""
+    """(..., n, 2): leg against base, zero at home: about the base's axis, then about n; NaN where none."""
     base_joint_rates: Array
     platform_joint_angles: Array
-    """(..., n, 2): platform against leg, zero at home: about the axis in the platform, then about n [Eq. 29]."""
+    """(..., n, 2): platform against leg, zero at home: about the platform's axis, then about n [Eq. 29]."""
     platform_joint_rates: Array
     base_cone_angle: Array
     """(..., n): between leg and cone axis of the base joint, rad."""
@@ -188,8 +188,8 @@ class Mobility:
 class Mechanism:
     """A parallel manipulator; made by `polypod.load`, never changed.
 
-    Arrays may have any leading axes, which broadcast; a `pose` is `(..., 4, 4)`, `twist` and `acceleration` are
-    `(..., 6)` at o in base axes. No method raises for a numerical outcome: see `Status`.
+    Arrays may have any leading axes, which broadcast; a `pose` is `(..., 4, 4)`, `twist` and `acceleration`
+    are `(..., 6)` at o in base axes. No method raises for a numerical outcome: see `Status`.
     """
 
     def __init__(
@@ -314,15 +314,15 @@ class Mechanism:
         sigma = self.conditioning(self.home)
         if not sigma.sigma_min > NEAR_SINGULAR:
             notes.append(
-                f"nearly singular at its centre pose: the smallest singular value is {float(sigma.sigma_min):.2g} "
-                f"against {float(sigma.sigma_max):.2g} for the largest. The platform can move there with hardly any "
-                "change of the leg lengths, and forces are large; stay clear of it."
+                "nearly singular at its centre pose: the smallest singular value is "
+                f"{float(sigma.sigma_min):.2g} against {float(sigma.sigma_max):.2g} for the largest. The platform "
+                "can move there with hardly any change of the leg lengths, and forces are large; stay clear of it."
             )
         if mobility.redundant:
             legs = " and ".join(mobility.redundant_legs)
             notes.append(
-                f"{mobility.redundant} redundant constraints couple legs {legs}: the parts must be made accurately, "
-                "and couples in these joints are statically indeterminate."
+                f"{mobility.redundant} redundant constraints couple legs {legs}: the parts must be made "
+                "accurately, and couples in these joints are statically indeterminate."
             )
         if mobility.passive:
             notes.append(
@@ -332,7 +332,7 @@ class Mechanism:
         return notes
 
     def mobility(self) -> Mobility:
-        """Freedoms, joints, redundant constraints and passive freedoms from ranks at generic poses [Eq. 1, T18]."""
+        """Freedoms, joints, redundant constraints and passive freedoms from generic ranks [Eq. 1] [T18]."""
         m = json.loads(self._core.mobility())
         names = self.leg_names
         graph, published = m["graph"], self._data.get("published")
@@ -411,12 +411,14 @@ class Mechanism:
             dict(zip(names, np.moveaxis(out[key], -1, 0), strict=True))
             for key in ("coordinates", "coordinate_rates", "coordinate_second_rates")
         ]
-        return State(out["pose"], out["twist"], out["acceleration"], *split, out["status"])
+        return State(
+            out["pose"], out["twist"], out["acceleration"], split[0], split[1], split[2], out["status"]
+        )
 
     def coordinates(self, pose: ArrayLike, set: str | None = None) -> dict[str, Array]:
-        """All numbers of a coordinate set at a pose, m and rad: the inverse of `pose`. The first set by default.
+        """All numbers of a coordinate set at a pose, m and rad: the inverse of `pose`.
 
-        NaN for a pose that breaks a constraint.
+        The first set by default. NaN for a pose that breaks a constraint.
         """
         set = next(iter(self._sets)) if set is None else set
         if set not in self._sets:
@@ -436,7 +438,8 @@ class Mechanism:
             for set, names in self.coordinate_sets.items()
         )
         raise CoordinateError(
-            f"{self.name} has no coordinate set with {', '.join(map(str, coordinates)) or 'no names'}; valid: {choices}"
+            f"{self.name} has no coordinate set with {', '.join(map(str, coordinates)) or 'no names'}; "
+            f"valid: {choices}"
         )
 
     # --- kinematics --------------------------------------------------------------------------------------
@@ -479,7 +482,7 @@ class Mechanism:
     def platform_acceleration(
         self, pose: ArrayLike, twist: ArrayLike, accelerations: ArrayLike
     ) -> tuple[Array, Codes]:
-        """The acceleration (..., 6) that gives the legs these accelerations (..., n), and the status [Eq. 19]."""
+        """The acceleration (..., 6) that gives the legs theirs (..., n), and the status [Eq. 19]."""
         shape, arrays = self._batch(
             pose=(pose, (4, 4)), twist=(twist, (6,)), accelerations=(accelerations, (self.n_legs,))
         )
@@ -487,7 +490,7 @@ class Mechanism:
         return out["acceleration"], out["status"]
 
     def conditioning(self, pose: ArrayLike) -> Conditioning:
-        """Singular values of the leg Jacobian on the allowed twists, lengths in `characteristic_length` [T24]."""
+        """Singular values of the leg Jacobian on the allowed twists, in `characteristic_length` [T24]."""
         shape, (poses,) = self._batch(pose=(pose, (4, 4)))
         return Conditioning(**_shaped(self._core.conditioning(poses), shape))
 
@@ -538,8 +541,10 @@ class Mechanism:
         Raises:
             CoordinateError: the mechanism has no two legs that share a constraint on one rod.
         """
-        shape, arrays = self._batch(pose=(pose, (4, 4)), constraint=(constraint, (6 - self.dof,)))
-        result = self._core.coupled_forces(*arrays, as_printed)
+        shape, (poses, multipliers) = self._batch(
+            pose=(pose, (4, 4)), constraint=(constraint, (6 - self.dof,))
+        )
+        result = self._core.coupled_forces(poses, multipliers, as_printed)
         if result is None:
             raise CoordinateError(f"{self.name} has no two legs that share a constraint on one rod")
         first, second = result[0]
@@ -572,7 +577,7 @@ class Mechanism:
 
     @staticmethod
     def _batch(**arguments: tuple[ArrayLike, tuple[int, ...]]) -> tuple[tuple[int, ...], list[Array]]:
-        """The common leading shape of named arrays with the given trailing shapes, and the arrays spread to it."""
+        """The common leading shape of arrays with the given trailing shapes, and the arrays spread to it."""
         arrays = {name: _array(name, value, core) for name, (value, core) in arguments.items()}
         shape = _broadcast(*(a.shape[: a.ndim - len(arguments[name][1])] for name, a in arrays.items()))
         return shape, [_spread(a, shape, arguments[name][1]) for name, a in arrays.items()]

@@ -26,6 +26,7 @@ A TOML file gives keyframes and the curve through them:
 from __future__ import annotations
 
 import csv
+import itertools
 import math
 import re
 import tomllib
@@ -35,7 +36,6 @@ from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from importlib import resources
 from importlib.resources.abc import Traversable
-from itertools import islice, pairwise
 from os import PathLike
 from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple, Protocol
@@ -55,7 +55,7 @@ Axes = Literal["base", "platform"]
 
 KIND_OF_COORDINATE: dict[str, str | None] = {
     **dict.fromkeys(("x", "y", "z", "p", "h", "tip_x", "tip_y", "tip_z"), "length"),
-    **dict.fromkeys(("alpha", "beta", "gamma", "rx", "ry", "rz"), "angle"),
+    **dict.fromkeys(("alpha", "beta", "gamma", "rx", "ry", "rz", "turn"), "angle"),
     **dict.fromkeys(("axis_x", "axis_y", "axis_z")),  # a direction of any length, without unit
 }
 KIND_OF_WRENCH: dict[str, str | None] = {
@@ -70,13 +70,15 @@ class HasCoordinateSets(Protocol):
     """What a motion needs of a mechanism."""
 
     @property
-    def coordinate_sets(self) -> CoordinateSets: ...
+    def coordinate_sets(self) -> CoordinateSets:
+        """Names of the coordinates of each set."""
 
 
 class Curve(Protocol):
-    """Coordinates over time (..., number of coordinates), or their derivative of order `nu`."""
+    """Coordinates as a function of time."""
 
-    def __call__(self, x: Array, nu: int = 0) -> Array: ...
+    def __call__(self, x: Array, nu: int = 0) -> Array:
+        """The derivative of order `nu` at times (N,), shape (N, number of coordinates)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,15 +97,18 @@ class Motion:
     curve: Curve | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
-        n = self.time.shape
-        arrays = {"time": self.time} | self.coordinates | self.rates | self.second_rates
-        for name, array in arrays.items():
-            if array.shape != n or array.ndim != 1:
-                raise ShapeError(f"{name} has shape {array.shape}; needs (N,), the same for all")
-        if not self.coordinates.keys() == self.rates.keys() == self.second_rates.keys():
+        names = self.coordinates.keys()
+        if not names == self.rates.keys() == self.second_rates.keys():
             raise ShapeError("coordinates, rates and second_rates must have the same names")
-        if self.wrench is not None and self.wrench.shape != (*n, 6):
-            raise ShapeError(f"wrench has shape {self.wrench.shape}; needs {(*n, 6)}")
+        for values in (self.coordinates, self.rates, self.second_rates):
+            _check(self.name, self.time, values)
+        if self.wrench is not None and self.wrench.shape != (*self.time.shape, 6):
+            raise ShapeError(f"wrench has shape {self.wrench.shape}; needs {(*self.time.shape, 6)}")
+        if self.branch not in (1, -1):
+            raise MotionError([Fault("branch", f"is {self.branch}; needs 1 or -1")], self.name)
+        if self.wrench_axes not in ("base", "platform"):
+            needed = f'is {shown(self.wrench_axes)}; needs "base" or "platform"'
+            raise MotionError([Fault("wrench_axes", needed)], self.name)
 
     @classmethod
     def through(
@@ -117,17 +122,22 @@ class Motion:
     ) -> Motion:
         """The motion through samples at `time`, by the quintic spline of `spline_through`; SI."""
         t = np.asarray(time, dtype=float)
-        values = np.stack([np.asarray(q, dtype=float) for q in coordinates.values()], axis=-1)
-        return cls.along(spline_through(t, values), t, tuple(coordinates), set=set, name=name, **more)
+        q = {coordinate: np.asarray(values, dtype=float) for coordinate, values in coordinates.items()}
+        _check(name, t, q)
+        if len(t) < 2:
+            raise MotionError([Fault("time", f"has too few samples, {len(t)}; needs two or more")], name)
+        return cls.along(spline_through(t, _columns_of(q)), t, tuple(q), set=set, name=name, **more)
 
     @classmethod
     def along(cls, curve: Curve, time: Array, names: tuple[str, ...], **more: Any) -> Motion:
         """The motion on `curve`, whose last axis is `names`, sampled at `time`."""
-        q, rates, second_rates = (dict(zip(names, curve(time, nu).T, strict=True)) for nu in range(3))
+        q, rates, second_rates = (
+            dict(zip(names, np.ascontiguousarray(curve(time, nu).T), strict=True)) for nu in range(3)
+        )
         return cls(time=time, coordinates=q, rates=rates, second_rates=second_rates, curve=curve, **more)
 
     def sample(self, time: ArrayLike) -> Motion:
-        """The same motion at other instants, (N,) in s, within its own.
+        """The same motion at other instants, (N,) in s, increasing, from its first to its last.
 
         It follows `curve`, or without one, between two of its samples, the quintic that has their values,
         rates and second rates. The wrench is linear between samples.
@@ -135,16 +145,33 @@ class Motion:
         t = np.asarray(time, dtype=float)
         start, end = self.time[0], self.time[-1]
         if outside := t[~((start <= t) & (t <= end))].tolist():
-            raise MotionError(
-                [Fault("time", f"is {outside[0]} s; the motion lasts from {start} s to {end} s")], self.name
-            )
-        curve = self.curve or _quintics(
-            self.time,
-            *(np.stack(list(d.values()), axis=-1) for d in (self.coordinates, self.rates, self.second_rates)),
-        )
+            message = f"is {outside[0]} s; the motion lasts from {start} s to {end} s"
+            raise MotionError([Fault("time", message)], self.name)
+        known = map(_columns_of, (self.coordinates, self.rates, self.second_rates))
+        curve = self.curve or _quintics(self.time, *known)
         moved = Motion.along(curve, t, tuple(self.coordinates), name=self.name, set=self.set)
         wrench = None if self.wrench is None else _linear(t, self.time, self.wrench)
         return replace(moved, branch=self.branch, wrench=wrench, wrench_axes=self.wrench_axes)
+
+
+def _check(name: str, time: Array, values: Mapping[str, Array]) -> None:
+    """Raise unless `values` are finite numbers at increasing times."""
+    arrays = {"time": time, **values}
+    for key, array in arrays.items():
+        if array.ndim != 1 or array.shape != time.shape:
+            raise ShapeError(f"{key} has shape {array.shape}; needs (N,), the same for all")
+    faults = [
+        Fault(key, f"holds {array[~np.isfinite(array)][0]}; needs finite numbers")
+        for key, array in arrays.items()
+        if not np.isfinite(array).all()
+    ]
+    faults += _not_increasing(itertools.repeat("time"), time.tolist())
+    if faults:
+        raise MotionError(faults, name)
+
+
+def _columns_of(values: Mapping[str, Array]) -> Array:
+    return np.stack(list(values.values()), axis=-1)
 
 
 # --- curves -------------------------------------------------------------------------------------------------
@@ -162,10 +189,13 @@ def spline_through(time: Array, values: Array) -> Curve:
 
 
 def quintic(time: Array, values: Array) -> Curve:
-    """The quintic spline, with four continuous derivatives, through all keyframes, at rest at both ends:
-    velocity and acceleration are zero there."""
-    rest = [(1, np.zeros(values.shape[1])), (2, np.zeros(values.shape[1]))]
-    spline: Curve = make_interp_spline(time, values, k=5, bc_type=(rest, rest))
+    """The quintic spline, with four continuous derivatives, through all keyframes, at rest at both ends.
+
+    At rest: velocity and acceleration are zero.
+    """
+    zero = np.zeros(values.shape[1])
+    at_rest: Any = [(1, zero), (2, zero)]  # order of the derivative, value
+    spline: Curve = make_interp_spline(time, values, k=5, bc_type=(at_rest, at_rest))
     return spline
 
 
@@ -201,10 +231,10 @@ def load_motion(
     branch: Literal[1, -1] | None = None,
     wrench_axes: Axes | None = None,
 ) -> Motion:
-    """The motion in a `.csv` or `.toml` file, or the built-in one of that name, for a mechanism (or for its
-    coordinate sets alone).
+    """The motion in a `.csv` or `.toml` file, or the built-in one of that name, for a mechanism.
 
-    `branch` and `wrench_axes` replace what a TOML file says; without them a CSV file means 1 and "base".
+    Its coordinate sets, which are all that is needed of the mechanism, will do in its place. `branch` and
+    `wrench_axes` replace what a TOML file says; without them a CSV file means 1 and "base".
     Raises MotionError with all faults of the file, UnknownNameError for a built-in that does not exist.
     """
     sets = mech if isinstance(mech, Mapping) else mech.coordinate_sets
@@ -335,7 +365,7 @@ def _samples(body: list[tuple[str, list[str]]], columns: list[_Column | None], f
                 name = column.name if column else f"number {i + 1}"
                 faults.append(Fault(place, f"column {name} is {shown(cell)}; needs a finite number"))
     if len(body) < 2:
-        faults.append(Fault("file", f"has {len(body)} samples; needs two or more"))
+        faults.append(Fault("file", f"has too few samples, {len(body)}; needs two or more"))
     for i, column in enumerate(columns):
         if column and column.name == "time":
             faults += _not_increasing([place for place, _ in body], samples[:, i].tolist())
@@ -345,11 +375,13 @@ def _samples(body: list[tuple[str, list[str]]], columns: list[_Column | None], f
 
 
 def _not_increasing(places: Iterable[str], times: Iterable[float]) -> list[Fault]:
-    return [
-        Fault(place, f"time is {time} after {before}; it must increase")
-        for place, (before, time) in zip(islice(places, 1, None), pairwise(times), strict=False)
-        if time <= before
-    ]
+    faults, before = [], -math.inf
+    for place, time in zip(places, times, strict=False):
+        if time <= before:
+            faults.append(Fault(place, f"time is {time} after {before}; it must increase"))
+        if math.isfinite(time):
+            before = time
+    return faults
 
 
 # --- TOML ---------------------------------------------------------------------------------------------------

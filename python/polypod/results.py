@@ -103,8 +103,10 @@ def _read_netcdf(path: Path) -> xr.Dataset:
 
 
 def _write_csv(dataset: xr.Dataset, path: Path) -> None:
-    """Comment lines (format; attributes; each variable, with its values if they do not run over time), then a
-    table of those that do."""
+    """Comment lines with all but the numbers over time, which follow as a table.
+
+    The comments: format; attributes; for each variable its outline, with its values if not in the table.
+    """
     outlines = _outlines(dataset)
     columns: list[list[Any]] = []
     for outline in outlines:

@@ -50,12 +50,16 @@ def _number_vector_or_matrix(value: object) -> str:
 
 
 class PolarPoint(Table):
+    """(radius cos angle, radius sin angle, z)."""
+
     radius: Number
     angle: Number
     z: Number = 0.0
 
 
 class PolarAxis(Table):
+    """(cos angle, sin angle, z)."""
+
     angle: Number
     z: Number = 0.0
 
@@ -70,12 +74,16 @@ Inertia = Annotated[_N | _V | _M, Discriminator(_number_vector_or_matrix)]
 
 
 class Header(Table):
+    """What stands above the first table."""
+
     name: str
     description: str = ""
     source: str = ""
 
 
 class Dynamics(Table):
+    """Gravity in base axes, efficiency eta, damping mu in N s/m and N m s/rad whatever the units."""
+
     gravity: Vector | None = None
     efficiency: Number = 1.0
     linear_damping: Number = 0.0
@@ -83,28 +91,38 @@ class Dynamics(Table):
 
 
 class Load(Table):
+    """The wrench on the platform at o."""
+
     force: Vector = [0.0, 0.0, 0.0]
     torque: Vector = [0.0, 0.0, 0.0]
     axes: Literal["base", "platform"] = "base"
 
 
 class Home(Table):
+    """The centre pose."""
+
     position: Vector
     rotation_vector: Vector = [0.0, 0.0, 0.0]
 
 
 class Tool(Table):
+    """Tip and tool axis in platform axes."""
+
     point: Point = [0.0, 0.0, 0.0]
     axis: Axis = [0.0, 0.0, 1.0]
 
 
 class Published(Table):
+    """The mobility terms that the source gives (Eq. 1 of the paper)."""
+
     dof: Annotated[int, Strict()]
     redundant: Annotated[int, Strict()]
     passive: Annotated[int, Strict()]
 
 
 class Body(Table):
+    """Mass, mass centre in the link's axes, inertia about it."""
+
     mass: Number
     center: Vector
     inertia: Inertia
@@ -119,6 +137,8 @@ class Link(Table):
 
 
 class Rod(Table):
+    """Rod axes are (L, n, L x n); `center` counts from `point`."""
+
     name: str
     point: Point
     axis: Axis
@@ -128,16 +148,22 @@ class Rod(Table):
 
 
 class Stroke(Table):
+    """Shortest and longest distance from B to b."""
+
     min: Number
     max: Number
 
 
 class Cone(Table):
+    """Largest angle between the leg and `axis`, its direction at home by default."""
+
     angle: Number
     axis: Axis | None = None
 
 
 class Joint(Table):
+    """A leg's joint, in the axes of its body."""
+
     joint: Literal["S", "U", "R", "F"]
     point: Point
     axis: Axis | None = None
@@ -147,6 +173,8 @@ class Joint(Table):
 
 
 class Leg(Table):
+    """Cylinder on the base joint, piston on the platform joint, between them the prismatic one."""
+
     name: str | None = None
     actuated: Annotated[bool, Strict()] = True
     stroke: Stroke | None = None

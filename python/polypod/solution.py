@@ -29,7 +29,12 @@ _PAIR = ("time", "leg", "joint_axis")
 VARIABLES: dict[str, tuple[tuple[str, ...], str, str, str]] = {
     "pose": (("time", "row", "column"), "1 and m", "", "pose of the platform, homogeneous matrix"),
     "twist": (_SIX, "m/s and rad/s", "V", "velocity of o and angular velocity of the platform"),
-    "acceleration": (_SIX, "m/s^2 and rad/s^2", "A", "acceleration of o and angular acceleration of the platform"),
+    "acceleration": (
+        _SIX,
+        "m/s^2 and rad/s^2",
+        "A",
+        "acceleration of o and angular acceleration of the platform",
+    ),
     "length": (_LEG, "m", "r", "leg length"),
     "rate": (_LEG, "m/s", "v_r", "leg rate"),
     "leg_acceleration": (_LEG, "m/s^2", "a_r", "leg acceleration"),
@@ -53,11 +58,11 @@ VARIABLES: dict[str, tuple[tuple[str, ...], str, str, str]] = {
     "rod_eps": (_ROD3, "rad/s^2", "ε_L", "angular acceleration of the rod"),
     "wrench": (_SIX, "N and N m", "(F_o, T_o)", "load on the platform at o, in its own axes"),
     "force": (_LEG, "N", "f_a", "active force of the leg"),
-    "constraint": (("time", "constraint"), "N or N m", "f_c", "multiplier of the constraint"),
+    "constraint": (("time", "constraint_row"), "N or N m", "f_c", "multiplier of the constraint"),
     "coupled_force": (("time", "coupled_leg"), "N", "f_c1, f_c3", "couple-constrained force"),
     "coupled_torque": (_TIME, "N m", "T_c", "couple-constrained torque on the rod"),
-    "coupled_force_as_printed": (("time", "coupled_leg"), "N", "f_c1, f_c3", "couple-constrained force by Eq. 44 as printed"),
-    "coupled_torque_as_printed": (_TIME, "N m", "T_c", "couple-constrained torque by Eq. 44 as printed"),
+    "coupled_force_as_printed": (("time", "coupled_leg"), "N", "f_c1, f_c3", "the same, Eq. 44 as printed"),
+    "coupled_torque_as_printed": (_TIME, "N m", "T_c", "the same, Eq. 44 as printed"),
     "kinetic_energy": (_TIME, "J", "K", "kinetic energy"),
     "potential_energy": (_TIME, "J", "P", "potential energy"),
     "actuator_power": (_TIME, "W", "", "power of the actuators"),
@@ -71,6 +76,12 @@ VARIABLES: dict[str, tuple[tuple[str, ...], str, str, str]] = {
 }
 _LENGTHS = {"x", "y", "z", "p", "h", "tip_x", "tip_y", "tip_z"}
 _PURE = {"axis_x", "axis_y", "axis_z"}
+# prefix of the variable, in words, unit, primes
+_ORDERS = (
+    ("coordinate_second_rate_", "second rate of ", "/s^2", "''"),
+    ("coordinate_rate_", "rate of ", "/s", "'"),
+    ("coordinate_", "", "", ""),
+)
 _SYMBOLS = {"alpha": "α", "beta": "β", "gamma": "γ", "x": "X_o", "y": "Y_o", "z": "Z_o"}
 
 
@@ -99,7 +110,9 @@ def solve(mech: Mechanism, motion: Motion, *, progress: Callable[[int, int], Non
     known = int(np.argmax(~np.isfinite(power))) if not np.isfinite(power).all() else total
     values["actuator_work"] = np.full(total, np.nan)
     if known > 2:
-        values["actuator_work"][:known] = cumulative_simpson(power[:known], x=motion.time[:known], initial=0.0)
+        values["actuator_work"][:known] = cumulative_simpson(
+            power[:known], x=motion.time[:known], initial=0.0
+        )
     return Solution(_dataset(mech, motion, values))
 
 
@@ -188,9 +201,8 @@ def _dataset(mech: Mechanism, motion: Motion, values: dict[str, NDArray[Any]]) -
     data: dict[str, Any] = {}
     for name, array in values.items():
         if name == "status":
-            meanings = " ".join(s.name for s in Status)
-            attrs = {"long_name": "outcome of the state", "flag_values": [int(s) for s in Status], "flag_meanings": meanings}
-            data[name] = (_TIME, array, attrs)
+            flags = {"flag_values": [*map(int, Status)], "flag_meanings": " ".join(s.name for s in Status)}
+            data[name] = (_TIME, array, {"long_name": "outcome of the state", **flags})
         elif name.startswith("coordinate_"):
             data[name] = (_TIME, array, _coordinate_attributes(name))
         else:
@@ -207,12 +219,12 @@ def _dataset(mech: Mechanism, motion: Motion, values: dict[str, NDArray[Any]]) -
         "row": [0, 1, 2, 3],
         "column": [0, 1, 2, 3],
         "rod": list(mech.rod_names),
-        "constraint_row": ("constraint", [f"{kind} of leg {leg}" for leg, kind in rows]),
+        "constraint_row": [f"{kind} of leg {leg}" for leg, kind in rows],
     }
     if mech.coupled_legs:
         coords["coupled_leg"] = list(mech.coupled_legs)
     coords = {name: value for name, value in coords.items() if _used(name, value, data)}
-    attrs = {
+    attrs: dict[str, str | int] = {
         "title": f"{mech.name} along {motion.name}",
         "mechanism": mech.name,
         "mechanism_file": mech.to_toml(),
@@ -236,12 +248,8 @@ def _used(name: str, value: Any, data: dict[str, Any]) -> bool:
 
 def _coordinate_attributes(name: str) -> dict[str, str]:
     """Unit and names of a variable such as coordinate_rate_alpha."""
-    for prefix, order, per in (("coordinate_second_rate_", "second rate of ", "/s^2"), ("coordinate_rate_", "rate of ", "/s")):
-        if name.startswith(prefix):
-            base, before, after = name.removeprefix(prefix), order, per
-            break
-    else:
-        base, before, after = name.removeprefix("coordinate_"), "", ""
+    prefix, before, per, primes = next(order for order in _ORDERS if name.startswith(order[0]))
+    base = name.removeprefix(prefix)
     unit = "m" if base in _LENGTHS else "1" if base in _PURE else "rad"
-    symbol = _SYMBOLS.get(base, base) + "'" * {"": 0, "/s": 1, "/s^2": 2}[after]
-    return {"units": unit + after, "symbol": symbol, "long_name": f"{before}coordinate {base}"}
+    symbol = _SYMBOLS.get(base, base) + primes
+    return {"units": unit + per, "symbol": symbol, "long_name": f"{before}coordinate {base}"}

@@ -12,7 +12,7 @@ from polypod import _core
 
 
 class Status(IntEnum):
-    """What became of a state. A batch never raises for a numerical outcome; results hold NaN where there is none."""
+    """What became of a state. A batch never raises for it; results hold NaN where there is no answer."""
 
     OK = 0
     NO_BRANCH = 1
@@ -33,7 +33,7 @@ _MESSAGES = {code: message for code, _, message in _core.statuses()}
 
 
 def count(status: ArrayLike) -> Iterator[tuple[Status, int, int]]:
-    """For each outcome other than OK: the status, how many states have it, and the index of the first of them."""
+    """For each outcome other than OK: the status, how many states have it, and the index of the first."""
     codes = np.asarray(status).ravel()
     for code in np.unique(codes[codes != Status.OK]):
         where = np.flatnonzero(codes == code)

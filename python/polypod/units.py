@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from polypod.errors import Fault, UnknownNameError, alternatives, shown
 
-Number = TypeVar("Number", float, NDArray[np.float64])
+Value = TypeVar("Value", float, NDArray[np.float64])
 
 # kind → unit → (n, d), one unit being n/d of the SI unit, which comes first. The pair keeps both numbers
 # exact, so that 270 mm becomes the very 0.27 that one would write in metres.
@@ -35,7 +35,7 @@ def si_unit(kind: str) -> str:
     return next(iter(UNITS[kind]))
 
 
-def to_si(value: Number, kind: str, unit: str) -> Number:
+def to_si(value: Value, kind: str, unit: str) -> Value:
     """`value`, a number or an array in `unit`, in SI.
 
     Raises UnknownNameError for a unit that is not of this kind.
@@ -44,7 +44,7 @@ def to_si(value: Number, kind: str, unit: str) -> Number:
     return value * n / d
 
 
-def from_si(value: Number, kind: str, unit: str) -> Number:
+def from_si(value: Value, kind: str, unit: str) -> Value:
     """The inverse of `to_si`, up to rounding."""
     n, d = _ratio(kind, unit)
     return value * d / n
@@ -74,12 +74,15 @@ class Units:
     chosen: dict[str, str]
 
     def of(self, kind: str) -> str:
+        """The unit of a kind."""
         return self.chosen.get(kind, si_unit(kind))
 
-    def si(self, value: Number, kind: str) -> Number:
+    def si(self, value: Value, kind: str) -> Value:
+        """A number or an array of the file in SI."""
         return to_si(value, kind, self.of(kind))
 
     def vector(self, values: Iterable[float], kind: str) -> list[float]:
+        """Numbers of the file in SI."""
         return [self.si(value, kind) for value in values]
 
 

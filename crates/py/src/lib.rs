@@ -1,5 +1,8 @@
 //! Arrays in, arrays out: the bindings of `polypod-core`. No mathematics here; shapes and names are the caller's.
 
+// Arguments arrive from Python by value.
+#![allow(clippy::needless_pass_by_value)]
+
 use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray1};
 use polypod_core::batch::{self, Coordinates, Loads, States, Table};
 use polypod_core::coordinates::Set;
@@ -53,6 +56,8 @@ fn arrays(py: Python<'_>, table: Table) -> PyResult<Bound<'_, PyDict>> {
     result.set_item("status", PyArray1::from_vec(py, status))?;
     Ok(result)
 }
+
+type CoordinateSet = (&'static str, Vec<&'static str>, Option<Vec<bool>>);
 
 #[pyclass(name = "Mechanism", frozen)]
 struct PyMechanism(Mechanism);
@@ -118,7 +123,7 @@ impl PyMechanism {
     }
 
     /// Name, all numbers, and whether each must be given (none for a set where any will do).
-    fn coordinate_sets(&self) -> Vec<(&'static str, Vec<&'static str>, Option<Vec<bool>>)> {
+    fn coordinate_sets(&self) -> Vec<CoordinateSet> {
         Set::of(&self.0)
             .iter()
             .map(|s| (s.name(), s.names().to_vec(), s.given(&self.0)))

@@ -1,0 +1,80 @@
+"""The look of all figures: one palette, one set of line widths, the same on screen and in print."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import matplotlib as mpl
+from cycler import cycler
+
+BLUE, ORANGE, GREEN, VERMILION = "#0072B2", "#E69F00", "#009E73", "#D55E00"
+PURPLE, SKY, BLACK, YELLOW = "#CC79A7", "#56B4E9", "#000000", "#F0E442"
+PALETTE = (BLUE, ORANGE, GREEN, VERMILION, PURPLE, SKY, BLACK)
+"""Colours that colour-blind readers can tell apart (Okabe and Ito, Color Universal Design, 2008)."""
+
+INK, GREY, PALE = "#262626", "#7A7A7A", "#E4E6E9"
+
+# In this order they stay distinct in black and white, too.
+DASHES = ("-", (0, (5, 1.5)), (0, (1.2, 1.2)), (0, (6, 1.5, 1.2, 1.5)), (0, (3, 1.2)))
+
+_RC: dict[str, Any] = {
+    "font.family": "DejaVu Sans",  # comes with matplotlib: figures are the same on every machine
+    "font.size": 8,
+    "text.color": INK,
+    "axes.labelsize": 8,
+    "axes.labelcolor": INK,
+    "axes.titlesize": 8.5,
+    "axes.titlelocation": "left",
+    "axes.edgecolor": GREY,
+    "axes.linewidth": 0.6,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "axes.xmargin": 0.0,
+    "axes.prop_cycle": cycler(color=PALETTE),
+    "grid.color": PALE,
+    "grid.linewidth": 0.5,
+    "lines.linewidth": 1.2,
+    "lines.solid_capstyle": "round",
+    "xtick.labelsize": 7.5,
+    "ytick.labelsize": 7.5,
+    "xtick.color": GREY,
+    "ytick.color": GREY,
+    "xtick.labelcolor": INK,
+    "ytick.labelcolor": INK,
+    "xtick.major.width": 0.6,
+    "ytick.major.width": 0.6,
+    "xtick.major.size": 2.5,
+    "ytick.major.size": 2.5,
+    "legend.frameon": False,
+    "legend.fontsize": 7.5,
+    "legend.handlelength": 1.6,
+    "legend.handletextpad": 0.5,
+    "legend.columnspacing": 1.0,
+    "legend.borderaxespad": 0.2,
+    "figure.facecolor": "white",
+    "savefig.facecolor": "white",
+    "savefig.dpi": 200,
+    "svg.fonttype": "path",
+    "svg.hashsalt": "polypod",  # else the identifiers in an SVG change from run to run
+}
+
+
+@contextmanager
+def house_style() -> Iterator[None]:
+    """The look applies to what is made, drawn or saved inside; matplotlib's own settings come back after."""
+    with mpl.rc_context(_RC):
+        yield
+
+
+def color_of(index: int) -> str:
+    """The colour of leg (or curve) number `index`, from 0, the same in every figure."""
+    return PALETTE[index % len(PALETTE)]
+
+
+def dash_of(index: int) -> Any:
+    """The line style of curve number `index`: solid through the whole palette, dashed in the next round."""
+    return DASHES[index // len(PALETTE) % len(DASHES)]
