@@ -315,8 +315,9 @@ class Mechanism:
         if not sigma.sigma_min > NEAR_SINGULAR:
             notes.append(
                 "nearly singular at its centre pose: the smallest singular value is "
-                f"{float(sigma.sigma_min):.2g} against {float(sigma.sigma_max):.2g} for the largest. The platform "
-                "can move there with hardly any change of the leg lengths, and forces are large; stay clear of it."
+                f"{float(sigma.sigma_min):.2g} against {float(sigma.sigma_max):.2g} for the largest. "
+                "The platform can move there with hardly any change of the leg lengths, and forces are large; "
+                "stay clear of it."
             )
         if mobility.redundant:
             legs = " and ".join(mobility.redundant_legs)

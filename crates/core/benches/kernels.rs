@@ -1,1 +1,75 @@
-fn main() {}
+//! Scalar cost of the kernels for one state of the published manipulator.
+
+#[path = "../tests/common/mod.rs"]
+mod common;
+
+use std::hint::black_box;
+
+use criterion::{Criterion, Throughput, criterion_group, criterion_main};
+use polypod_core::coordinates::State;
+use polypod_core::real::{Dual, Real};
+use polypod_core::spatial::{Acceleration, Pose, Twist, Vec3, Wrench};
+use polypod_core::{dynamics, jacobian, leg};
+
+/// Different states in turn, so that nothing is learnt from the last one.
+const STATES: usize = 64;
+
+fn lifted<T: Real>(state: &State) -> (Pose<T>, Twist<T>, Acceleration<T>) {
+    let lift = Vec3::<T>::lift;
+    (
+        Pose::lift(&state.pose),
+        Twist::new(lift(state.twist.v), lift(state.twist.omega)),
+        Acceleration::new(lift(state.acceleration.a), lift(state.acceleration.eps)),
+    )
+}
+
+fn kernels(criterion: &mut Criterion) {
+    let mech = common::published();
+    let states = common::states(&mech, STATES, 1);
+    let mut group = criterion.benchmark_group("one state, scalar");
+    group.throughput(Throughput::Elements(1));
+    let mut measure = |name: &str, run: &dyn Fn(&State)| {
+        let mut next = (0..STATES).cycle();
+        group.bench_function(name, |b| {
+            b.iter(|| run(black_box(&states[next.next().unwrap_or(0)])));
+        });
+    };
+    measure("inverse kinematics", &|s| {
+        for leg in &mech.legs {
+            black_box(leg::position(leg, &s.pose).length);
+        }
+    });
+    measure("Jacobian", &|s| {
+        black_box(jacobian::jacobian(&mech, &s.pose));
+    });
+    measure("Hessian", &|s| {
+        black_box(jacobian::hessian(&mech, &s.pose));
+    });
+    measure("inverse dynamics", &|s| {
+        black_box(dynamics::inverse_dynamics(
+            &mech,
+            &s.pose,
+            &s.twist,
+            &s.acceleration,
+            mech.load.wrench,
+        ));
+    });
+    measure("inverse dynamics and one derivative", &|s| {
+        let (pose, twist, acceleration) = lifted::<Dual<f64>>(s);
+        let load = Wrench::new(
+            Vec3::lift(mech.load.wrench.force),
+            Vec3::lift(mech.load.wrench.torque),
+        );
+        black_box(dynamics::inverse_dynamics(
+            &mech,
+            &pose,
+            &twist,
+            &acceleration,
+            load,
+        ));
+    });
+    group.finish();
+}
+
+criterion_group!(benches, kernels);
+criterion_main!(benches);

@@ -80,14 +80,11 @@ impl States<'_> {
 
     /// The state, and whether it is one that the mechanism can be in.
     fn read(&self, mech: &Mechanism, i: usize) -> (Pose<f64>, Twist<f64>, Acceleration<f64>, Status) {
-        let (pose, mut status) = read_pose(mech, self.poses, i);
-        let (twist, acceleration) = (
-            Twist::from_array(six(self.twists, i)),
-            Acceleration::from_array(six(self.accelerations, i)),
-        );
-        if status == Status::Ok {
-            status = check_motion(mech, &pose, &twist, &acceleration);
-        }
+        let (pose, status) = read_pose(mech, self.poses, i);
+        let twist = Twist::from_array(six(self.twists, i));
+        let acceleration = Acceleration::from_array(six(self.accelerations, i));
+        let status = then(status, || check_twist(mech, &pose, &twist));
+        let status = then(status, || check_acceleration(mech, &pose, &twist, &acceleration));
         (pose, twist, acceleration, status)
     }
 }
@@ -130,34 +127,60 @@ fn read_pose(mech: &Mechanism, poses: &[f64], i: usize) -> (Pose<f64>, Status) {
     (pose, status)
 }
 
-/// Whether twist and acceleration keep the constraints: `(c, τ)·V = 0` and `(c, τ)·A + Vᵀ h V = 0`.
-fn check_motion(
+/// Whether a twist keeps the constraints: `(c, τ)·V = 0`.
+fn check_twist(mech: &Mechanism, pose: &Pose<f64>, twist: &Twist<f64>) -> Status {
+    let speed = speed(mech, twist);
+    let kept = mech.independent.iter().all(|c| {
+        let row = constraint::row(c, pose);
+        let size = constraint::row_size(&row, mech.characteristic_length);
+        row.power(twist).abs() <= CONSTRAINT_TOLERANCE * speed * size
+    });
+    match (speed.is_finite(), kept) {
+        (false, _) => Status::InvalidInput,
+        (true, false) => Status::OffConstraint,
+        (true, true) => Status::Ok,
+    }
+}
+
+/// Whether an acceleration keeps the constraints with that twist: `(c, τ)·A + Vᵀ h V = 0`.
+fn check_acceleration(
     mech: &Mechanism,
     pose: &Pose<f64>,
     twist: &Twist<f64>,
-    acceleration: &Acceleration<f64>,
+    a: &Acceleration<f64>,
 ) -> Status {
-    if twist
-        .array()
-        .iter()
-        .chain(&acceleration.array())
-        .any(|x| !x.is_finite())
-    {
-        return Status::InvalidInput;
-    }
+    let as_twist = Twist::new(a.a, a.eps);
     let scale = mech.characteristic_length;
-    let speed = twist.v.norm() + twist.omega.norm() * scale;
-    let second = acceleration.a.norm() + acceleration.eps.norm() * scale + speed * speed / scale;
+    let (speed, second) = (speed(mech, twist), self::speed(mech, &as_twist));
     let kept = mech.independent.iter().all(|c| {
         let row = constraint::row(c, pose);
         let size = constraint::row_size(&row, scale);
-        let slip = row.power(twist);
-        let bend = Wrench::power(row, &Twist::new(acceleration.a, acceleration.eps))
-            + jacobian::quadratic(&constraint::hessian(c, pose), &twist.array());
-        slip.abs() <= CONSTRAINT_TOLERANCE * speed * size
-            && bend.abs() <= CONSTRAINT_TOLERANCE * second * size
+        let g = row.power(&as_twist) + jacobian::quadratic(&constraint::hessian(c, pose), &twist.array());
+        g.abs() <= CONSTRAINT_TOLERANCE * (second + speed * speed / scale) * size
     });
-    if kept { Status::Ok } else { Status::OffConstraint }
+    match (second.is_finite(), kept) {
+        (false, _) => Status::InvalidInput,
+        (true, false) => Status::OffConstraint,
+        (true, true) => Status::Ok,
+    }
+}
+
+/// Size of a twist, turns counted as arcs at the characteristic length.
+fn speed(mech: &Mechanism, twist: &Twist<f64>) -> f64 {
+    twist.v.norm() + twist.omega.norm() * mech.characteristic_length
+}
+
+/// The first of two outcomes that is not ok; the second is looked at only if the first is.
+fn then(first: Status, second: impl FnOnce() -> Status) -> Status {
+    if first == Status::Ok { second() } else { first }
+}
+
+fn check_finite(values: &[f64]) -> Status {
+    if values.iter().all(|x| x.is_finite()) {
+        Status::Ok
+    } else {
+        Status::InvalidInput
+    }
 }
 
 fn stroke_status(mech: &Mechanism, pose: &Pose<f64>) -> Status {
@@ -336,9 +359,10 @@ pub fn inverse_dynamics(mech: &Mechanism, states: &States, loads: &Loads) -> Tab
         ],
     );
     for i in 0..n {
-        let (pose, twist, acceleration, mut status) = states.read(mech, i);
+        let (pose, twist, acceleration, status) = states.read(mech, i);
+        let load = loads.at(mech, &pose, i);
+        let mut status = then(status, || check_finite(&load.array()));
         if status == Status::Ok {
-            let load = loads.at(mech, &pose, i);
             let (f, pivots) = dynamics::inverse_dynamics(mech, &pose, &twist, &acceleration, load);
             status = outcome(&f, pivots);
             if status == Status::Ok {
@@ -375,9 +399,11 @@ pub fn platform_twist(mech: &Mechanism, poses: &[f64], rates: &[f64]) -> Table {
     let n = poses.len() / 16;
     let (mut table, [field]) = Table::new(n, [("twist", vec![6])]);
     for i in 0..n {
-        let (pose, mut status) = read_pose(mech, poses, i);
+        let (pose, status) = read_pose(mech, poses, i);
+        let legs = actuated_values(mech, rates, i);
+        let mut status = then(status, || check_finite(&legs));
         if status == Status::Ok {
-            let (twist, pivots) = jacobian::platform_twist(mech, &pose, &actuated_values(mech, rates, i));
+            let (twist, pivots) = jacobian::platform_twist(mech, &pose, &legs);
             status = outcome(&twist.array(), pivots);
             if status == Status::Ok {
                 table.set(field, i, 0, &twist.array());
@@ -399,10 +425,12 @@ pub fn platform_acceleration(
     let n = poses.len() / 16;
     let (mut table, [field]) = Table::new(n, [("acceleration", vec![6])]);
     for i in 0..n {
-        let (pose, mut status) = read_pose(mech, poses, i);
+        let (pose, status) = read_pose(mech, poses, i);
+        let twist = Twist::from_array(six(twists, i));
+        let legs = actuated_values(mech, accelerations, i);
+        let status = then(status, || check_twist(mech, &pose, &twist));
+        let mut status = then(status, || check_finite(&legs));
         if status == Status::Ok {
-            let twist = Twist::from_array(six(twists, i));
-            let legs = actuated_values(mech, accelerations, i);
             let (a, pivots) = jacobian::platform_acceleration(mech, &pose, &twist, &legs);
             status = outcome(&a.array(), pivots);
             if status == Status::Ok {
@@ -436,10 +464,7 @@ pub fn coupled_forces(
     for i in 0..n {
         let (pose, status) = read_pose(mech, poses, i);
         let f_c = multipliers[i * k + index];
-        table.status[i] = match status {
-            Status::Ok if !f_c.is_finite() => Status::InvalidInput,
-            other => other,
-        };
+        table.status[i] = then(status, || check_finite(&[f_c]));
         if table.status[i] == Status::Ok {
             let c = dynamics::coupled_forces(mech, pair, axis, platform_axis, &pose, f_c, as_printed);
             if c.forces.iter().all(|f| f.is_finite()) {
@@ -471,13 +496,13 @@ pub fn power(mech: &Mechanism, states: &States, loads: &Loads) -> Table {
     let (mut table, ids) = Table::new(n, names.map(|name| (name, vec![])));
     for i in 0..n {
         let (pose, twist, acceleration, status) = states.read(mech, i);
-        table.status[i] = status;
-        if status != Status::Ok {
+        let load_wrench = loads.at(mech, &pose, i);
+        table.status[i] = then(status, || check_finite(&load_wrench.array()));
+        if table.status[i] != Status::Ok {
             continue;
         }
         table.status[i] = stroke_status(mech, &pose);
         let (kinetic, potential) = energy_along(mech, &pose, &twist, &acceleration);
-        let load_wrench = loads.at(mech, &pose, i);
         let load = load_wrench.power(&twist);
         let damping = -(mech.linear_damping * twist.v.dot(twist.v)
             + mech.angular_damping * twist.omega.dot(twist.omega));

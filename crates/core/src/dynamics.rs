@@ -1,7 +1,7 @@
 //! Inverse dynamics by virtual power: every link's weight and inertia is carried to the platform's twist by the
 //! transpose of its own Jacobian, then actuators and constraints balance the sum [Eq. 40-43] \[T13\]-\[T17\].
 
-use crate::jacobian::{Matrix6, jacobian};
+use crate::jacobian::{Matrix6, scaled_jacobian};
 use crate::leg;
 use crate::linear::solve;
 use crate::mechanism::{Body, Leg, Mechanism, Rod};
@@ -134,8 +134,12 @@ pub fn inverse_dynamics<T: Real>(
     acceleration: &Acceleration<T>,
     load: Wrench<T>,
 ) -> ([T; 6], f64) {
-    let w = resultant(mech, pose, twist, acceleration, load).array();
-    solve(transposed(&jacobian(mech, pose)), w.map(|x| -x))
+    let w = resultant(mech, pose, twist, acceleration, load);
+    let scaled = Wrench::new(w.force, w.torque * T::lit(1.0 / mech.characteristic_length));
+    solve(
+        transposed(&scaled_jacobian(mech, pose)),
+        scaled.array().map(|x| -x),
+    )
 }
 
 #[inline(always)]

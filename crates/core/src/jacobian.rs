@@ -24,6 +24,21 @@ pub fn jacobian<T: Real>(mech: &Mechanism, pose: &Pose<T>) -> Matrix6<T> {
     rows.map(Wrench::array)
 }
 
+/// J with its torque columns divided by the characteristic length: pure numbers, so that a pivot ratio means the
+/// same for every size of machine. It belongs to the twist (v, Λω).
+#[inline(always)]
+pub fn scaled_jacobian<T: Real>(mech: &Mechanism, pose: &Pose<T>) -> Matrix6<T> {
+    let inverse = T::lit(1.0 / mech.characteristic_length);
+    jacobian(mech, pose).map(|row| std::array::from_fn(|j| if j < 3 { row[j] } else { row[j] * inverse }))
+}
+
+/// A solution (v, Λω) as (v, ω).
+#[inline(always)]
+fn unscaled<T: Real>(mech: &Mechanism, x: [T; 6]) -> [T; 6] {
+    let inverse = T::lit(1.0 / mech.characteristic_length);
+    std::array::from_fn(|j| if j < 3 { x[j] } else { x[j] * inverse })
+}
+
 /// H of `J A + Vᵀ H V = (ℓ'', 0)`, one symmetric 6×6 layer for each row of J [Eq. 19].
 #[inline(always)]
 pub fn hessian<T: Real>(mech: &Mechanism, pose: &Pose<T>) -> [Hessian<T>; 6] {
@@ -41,8 +56,8 @@ pub fn hessian<T: Real>(mech: &Mechanism, pose: &Pose<T>) -> [Hessian<T>; 6] {
 /// The platform's twist from the rates of the actuated legs, and the pivot ratio of J [Eq. 13].
 #[inline(always)]
 pub fn platform_twist<T: Real>(mech: &Mechanism, pose: &Pose<T>, rates: &[T]) -> (Twist<T>, f64) {
-    let (v, pivots) = solve(jacobian(mech, pose), padded(rates));
-    (Twist::from_array(v), pivots)
+    let (v, pivots) = solve(scaled_jacobian(mech, pose), padded(rates));
+    (Twist::from_array(unscaled(mech, v)), pivots)
 }
 
 /// The platform's acceleration from those of the actuated legs: `A = J⁻¹ (ℓ'' - Vᵀ H V)` [Eq. 19].
@@ -58,8 +73,8 @@ pub fn platform_acceleration<T: Real>(
     for (entry, h) in rhs.iter_mut().zip(hessian(mech, pose)) {
         *entry = *entry - quadratic(&h, &v);
     }
-    let (a, pivots) = solve(jacobian(mech, pose), rhs);
-    (Acceleration::from_array(a), pivots)
+    let (a, pivots) = solve(scaled_jacobian(mech, pose), rhs);
+    (Acceleration::from_array(unscaled(mech, a)), pivots)
 }
 
 /// `vᵀ h v`.

@@ -6,7 +6,7 @@
 use crate::constraint::{self, Constraint, ConstraintKind};
 use crate::leg;
 use crate::mobility::{self, Mobility};
-use crate::spatial::{Mat3, Pose, Twist, Vec3, Wrench};
+use crate::spatial::{Mat3, Pose, Vec3, Wrench};
 use crate::spec::{ANGLE_TOLERANCE, Axes, BodySpec, Fault, JointKind, JointSpec, LegSpec, RodSpec, Spec};
 
 /// Mass, mass centre and inertia about it, in the axes of the link.
@@ -280,19 +280,6 @@ impl Mechanism {
             .iter()
             .map(|c| constraint::distance(c, pose, self.characteristic_length))
             .fold(0.0, |m, d| if d > m || d.is_nan() { d } else { m })
-    }
-
-    /// The largest speed by which `twist` breaks an independent constraint, relative to the speed of the platform.
-    #[must_use]
-    pub fn constraint_slip(&self, pose: &Pose<f64>, twist: &Twist<f64>) -> f64 {
-        let scale = self.characteristic_length;
-        let speed = twist.v.norm() + twist.omega.norm() * scale;
-        let slip = self.independent.iter().map(|c| {
-            let row = constraint::row(c, pose);
-            row.power(twist).abs() / constraint::row_size(&row, scale)
-        });
-        let worst = slip.fold(0.0, |m, s| if s > m || s.is_nan() { s } else { m });
-        if speed == 0.0 { 0.0 } else { worst / speed }
     }
 }
 

@@ -1,0 +1,235 @@
+"""What is worth telling about a mechanism and about a solution, as plain data: JSON holds it as it is.
+
+SI units and radians. Numbers that do not exist (no stroke limit, no answer) are None.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import defaultdict
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from polypod.mechanism import Mechanism, Mobility
+from polypod.results import Solution
+from polypod.status import Status, count
+
+Array = NDArray[np.float64]
+
+CONDITIONS = {
+    "A": "r, the base axis L and the platform axis l stay in one plane",
+    "B": "r stays at right angles to an axis of the base",
+    "C": "r stays at right angles to an axis of the platform",
+    "D": "an axis of the platform stays at right angles to one of the base",
+}
+"""What the constraints of theory [T9] demand, by kind."""
+
+_BY_JOINTS = {2: "binary", 3: "ternary", 4: "quaternary", 5: "pentagonal", 6: "hexagonal"}
+
+
+# --- a mechanism --------------------------------------------------------------------------------------------
+
+
+def link_kind(joints: int) -> str:
+    """The name of a link by its number of joints: binary, ternary, ..."""
+    return _BY_JOINTS.get(joints, f"{joints}-joint")
+
+
+def links_by_joints(mobility: Mobility) -> dict[str, tuple[str, ...]]:
+    """Names of the links by `link_kind`, those with most joints first."""
+    groups: defaultdict[int, list[str]] = defaultdict(list)
+    for link in mobility.graph_links:
+        groups[len(link.joints)].append(link.name)
+    return {link_kind(n): tuple(groups[n]) for n in sorted(groups, reverse=True)}
+
+
+def describe(mech: Mechanism) -> dict[str, Any]:
+    """All that `polypod info` tells about a mechanism."""
+    mobility, file = mech.mobility(), mech.to_dict()
+    centre = mech.conditioning(mech.home)
+    legs = zip(mech.leg_names, mech.leg_letters, mech.actuated, mech.stroke, strict=True)
+    terms = ("dof", "links", "joints", "joint_freedoms", "loops", "closure_rank")
+    terms += ("redundant", "redundant_legs", "passive", "passive_legs")
+    return {
+        "name": mech.name,
+        "description": file.get("description", ""),
+        "source": file.get("source", ""),
+        "units": "SI, rad",
+        "legs": [
+            {"name": name, "joints": letters, "actuated": bool(actuated), "stroke": _numbers(stroke)}
+            for name, letters, actuated, stroke in legs
+        ],
+        "mobility": {term: getattr(mobility, term) for term in terms},
+        "accounting": accounting(mobility),
+        "links_by_joints": links_by_joints(mobility),
+        "constraints": [
+            {
+                "leg": leg,
+                "kind": kind,
+                "condition": CONDITIONS[kind],
+                "independent": i in mobility.independent_rows,
+            }
+            for i, (leg, kind) in enumerate(mobility.constraint_rows)
+        ],
+        "coordinate_sets": mech.coordinate_sets,
+        "characteristic_length": mech.characteristic_length,
+        "centre_pose": {
+            "pose": mech.home.tolist(),
+            "sigma_min": _number(centre.sigma_min),
+            "sigma_max": _number(centre.sigma_max),
+            "condition": _number(centre.condition),
+        },
+        "warnings": mech.warnings,
+    }
+
+
+def accounting(mobility: Mobility) -> dict[str, Any]:
+    """The terms of Eq. 1 from ranks, beside those that the mechanism's publication gives, and what to think of it."""
+    m, p = mobility, mobility.published
+    common = 6 * (m.links - m.joints - 1) + m.joint_freedoms
+
+    def row(redundant: int, passive: int) -> dict[str, int]:
+        return {"redundant": redundant, "passive": passive, "sum": common + redundant - passive}
+
+    computed = row(m.redundant, m.passive)
+    if p is None:
+        return {"computed": computed, "published": None, "note": ""}
+    published = row(p.redundant, p.passive)
+    why = (
+        f"the loop closures have rank {m.closure_rank} of {6 * m.loops}, so {m.redundant} are redundant; "
+        f"{m.joint_freedoms} joint freedoms less {m.closure_rank} leave {m.joint_freedoms - m.closure_rank}, "
+        f"of which the platform has {m.dof}, so {m.passive} are passive"
+    )
+    if published["sum"] != m.dof:
+        note = f"the published terms add up to {published['sum']}, not to {m.dof}: {why}"
+    elif published == computed:
+        note = "the published terms agree"
+    else:
+        note = (
+            f"the published sum is right, as only ς - M_0 enters it and {p.redundant} - {p.passive} = "
+            f"{m.redundant} - {m.passive}; the split is not: {why}"
+        )
+    return {"computed": computed, "published": published, "note": note}
+
+
+# --- a solution ---------------------------------------------------------------------------------------------
+
+
+def summarise(mech: Mechanism, solution: Solution) -> dict[str, Any]:
+    """Ranges, peaks and outcomes along a motion: all that `polypod solve` tells about it."""
+    data = solution.dataset
+    time = data["time"].to_numpy()
+
+    def of(name: str) -> Array:
+        return data[name].to_numpy()
+
+    legs = [
+        {
+            "name": name,
+            "length": [_least(of("length")[:, i]), _greatest(of("length")[:, i])],
+            "stroke": _numbers(mech.stroke[i]),
+            "peak_rate": _peak(of("rate")[:, i]),
+            "peak_force": _peak(of("force")[:, i]),
+        }
+        for i, name in enumerate(mech.leg_names)
+    ]
+    outcomes = [
+        {"status": status.name, "count": n, "first_time": float(time[first]), "message": status.message}
+        for status, n, first in count(of("status"))
+    ]
+    sigma = of("sigma_min")
+    nearest = int(np.nanargmin(sigma)) if np.isfinite(sigma).any() else None
+    return {
+        "mechanism": mech.name,
+        "motion": data.attrs["motion"],
+        "coordinate_set": data.attrs["coordinate_set"],
+        "units": "SI, rad",
+        "states": len(time),
+        "without_answer": int(np.sum(~np.isin(of("status"), (Status.OK, Status.OUT_OF_STROKE)))),
+        "start": float(time[0]),
+        "end": float(time[-1]),
+        "platform": {
+            "peak_speed": _greatest(np.linalg.norm(of("twist")[:, :3], axis=-1)),
+            "peak_angular_speed": _greatest(np.linalg.norm(of("twist")[:, 3:], axis=-1)),
+        },
+        "legs": legs,
+        "outcomes": outcomes,
+        "nearest_to_singular": None
+        if nearest is None
+        else {
+            "time": float(time[nearest]),
+            "sigma_min": _number(sigma[nearest]),
+            "condition": _number(of("condition")[nearest]),
+        },
+        "power": _power(solution),
+        "coupled": _coupled(solution),
+    }
+
+
+def _power(solution: Solution) -> dict[str, float | None]:
+    """The greatest actuator power, the greatest residual, and the residual as a part of all powers that flow."""
+    data = solution.dataset
+    names = ("actuator_power", "load_power", "damping_power", "friction_power")
+    flows = np.sum([np.abs(data[name].to_numpy()) for name in names], axis=0)
+    residual = data["power_residual"].to_numpy()
+    greatest, flow = _greatest(np.abs(residual)), _greatest(flows)
+    return {
+        "peak_actuators": _peak(data["actuator_power"].to_numpy()),
+        "greatest_residual": greatest,
+        "relative_residual": greatest / flow if greatest is not None and flow else None,
+    }
+
+
+def _coupled(solution: Solution) -> dict[str, Any] | None:
+    """Peaks of the couple-constrained forces and torque, consistent and by Eq. 44 as printed."""
+    data = solution.dataset
+    if "coupled_force" not in data:
+        return None
+    forces, printed = data["coupled_force"].to_numpy(), data["coupled_force_as_printed"].to_numpy()
+    ratio = np.abs(printed[:, 0] / np.where(forces[:, 0] == 0.0, np.nan, forces[:, 0]))
+    active = _greatest(np.abs(data["force"].to_numpy()))
+    largest = _greatest(np.abs(forces))
+    return {
+        "legs": data["coupled_leg"].to_numpy().tolist(),
+        "peak_forces": [_peak(f) for f in forces.T],
+        "peak_forces_as_printed": [_peak(f) for f in printed.T],
+        "peak_torque": _peak(data["coupled_torque"].to_numpy()),
+        "peak_torque_as_printed": _peak(data["coupled_torque_as_printed"].to_numpy()),
+        "consistent_over_printed": [_reciprocal(_greatest(ratio)), _reciprocal(_least(ratio))],
+        "share_of_active": largest / active if largest is not None and active else None,
+    }
+
+
+# --- numbers that exist -------------------------------------------------------------------------------------
+
+
+def _number(value: ArrayLike) -> float | None:
+    number = float(np.asarray(value))
+    return number if math.isfinite(number) else None
+
+
+def _numbers(values: ArrayLike) -> list[float | None]:
+    """Limits; a least length of zero is none."""
+    return [_number(v) if v != 0.0 else None for v in np.asarray(values)]
+
+
+def _reciprocal(value: float | None) -> float | None:
+    return 1.0 / value if value else None
+
+
+def _least(values: Array) -> float | None:
+    finite = values[np.isfinite(values)]
+    return float(finite.min()) if finite.size else None
+
+
+def _greatest(values: Array) -> float | None:
+    finite = values[np.isfinite(values)]
+    return float(finite.max()) if finite.size else None
+
+
+def _peak(values: Array) -> float | None:
+    """The value of largest magnitude, with its sign."""
+    finite = values[np.isfinite(values)]
+    return float(finite[np.argmax(np.abs(finite))]) if finite.size else None
