@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.integrate import cumulative_simpson
 
 from polypod import _core
-from polypod.mechanism import Mechanism
+from polypod.mechanism import Mechanism, State
 from polypod.motion import Motion
 from polypod.results import Solution
 from polypod.status import Status
@@ -96,12 +96,13 @@ def solve(mech: Mechanism, motion: Motion, *, progress: Callable[[int, int], Non
     Returns:
         A `Solution`, whose dataset has one variable for each quantity, SI, and the `Status` of every state.
     """
-    total, parts, guess = len(motion.time), [], None
+    state = mech.state(
+        motion.coordinates, motion.rates, motion.second_rates, branch=motion.branch, continued=True
+    )
+    total, parts = len(motion.time), []
     for start in range(0, total, CHUNK):
         chunk = slice(start, min(start + CHUNK, total))
-        values, last = _solve_chunk(mech, motion, chunk, guess)
-        guess = guess if last is None else last
-        parts.append(values)
+        parts.append(_solve_chunk(mech, motion, state, chunk))
         if progress is not None:
             progress(chunk.stop, total)
     values = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
@@ -116,23 +117,9 @@ def solve(mech: Mechanism, motion: Motion, *, progress: Callable[[int, int], Non
     return Solution(_dataset(mech, motion, values))
 
 
-def _solve_chunk(
-    mech: Mechanism, motion: Motion, chunk: slice, guess: Array | None
-) -> tuple[dict[str, NDArray[Any]], Array | None]:
-    """All variables of some states, and the last pose that was found, to start the next ones from."""
-
-    def cut(series: dict[str, Array]) -> dict[str, Array]:
-        return {name: values[chunk] for name, values in series.items()}
-
-    state = mech.state(
-        cut(motion.coordinates),
-        cut(motion.rates),
-        cut(motion.second_rates),
-        branch=motion.branch,
-        guess=guess,
-        continued=True,
-    )
-    pose, twist, acceleration = state.pose, state.twist, state.acceleration
+def _solve_chunk(mech: Mechanism, motion: Motion, state: State, chunk: slice) -> dict[str, NDArray[Any]]:
+    """All variables of some states."""
+    pose, twist, acceleration = state.pose[chunk], state.twist[chunk], state.acceleration[chunk]
     kin = mech.kinematics(pose, twist, acceleration)
     wrench = None if motion.wrench is None else motion.wrench[chunk]
     own = mech.geometry["load"]
@@ -142,7 +129,8 @@ def _solve_chunk(
     power = mech.power(pose, twist, acceleration, *load)
     conditioning = mech.conditioning(pose)
     # The first thing that went wrong explains the rest.
-    status = np.where(state.status != Status.OK, state.status, dynamics.status)
+    found = state.status[chunk]
+    status = np.where(found != Status.OK, found, dynamics.status)
     values: dict[str, NDArray[Any]] = {
         "pose": pose,
         "twist": twist,
@@ -191,9 +179,8 @@ def _solve_chunk(
         ("coordinate_rate_", state.coordinate_rates),
         ("coordinate_second_rate_", state.coordinate_second_rates),
     ):
-        values |= {prefix + name: column for name, column in series.items()}
-    found = np.flatnonzero(np.isfinite(pose).all(axis=(1, 2)))
-    return values, pose[found[-1]] if len(found) else None
+        values |= {prefix + name: column[chunk] for name, column in series.items()}
+    return values
 
 
 def _dataset(mech: Mechanism, motion: Motion, values: dict[str, NDArray[Any]]) -> xr.Dataset:

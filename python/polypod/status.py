@@ -22,6 +22,7 @@ class Status(IntEnum):
     OUT_OF_STROKE = 5
     OFF_CONSTRAINT = 6
     INVALID_INPUT = 7
+    BRANCH_JUMP = 8
 
     @property
     def message(self) -> str:

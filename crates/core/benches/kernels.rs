@@ -46,27 +46,12 @@ fn kernels(criterion: &mut Criterion) {
         black_box(jacobian::hessian(&mech, &s.pose));
     });
     measure("inverse dynamics", &|s| {
-        black_box(dynamics::inverse_dynamics(
-            &mech,
-            &s.pose,
-            &s.twist,
-            &s.acceleration,
-            mech.load.wrench,
-        ));
+        black_box(dynamics::inverse_dynamics(&mech, &s.pose, &s.twist, &s.acceleration, mech.load.wrench));
     });
     measure("inverse dynamics and one derivative", &|s| {
         let (pose, twist, acceleration) = lifted::<Dual<f64>>(s);
-        let load = Wrench::new(
-            Vec3::lift(mech.load.wrench.force),
-            Vec3::lift(mech.load.wrench.torque),
-        );
-        black_box(dynamics::inverse_dynamics(
-            &mech,
-            &pose,
-            &twist,
-            &acceleration,
-            load,
-        ));
+        let load = Wrench::new(Vec3::lift(mech.load.wrench.force), Vec3::lift(mech.load.wrench.torque));
+        black_box(dynamics::inverse_dynamics(&mech, &pose, &twist, &acceleration, load));
     });
     group.finish();
 }

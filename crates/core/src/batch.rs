@@ -37,16 +37,9 @@ impl Table {
     fn new<const N: usize>(states: usize, fields: [(&'static str, Vec<usize>); N]) -> (Self, [FieldId; N]) {
         let fields = fields.map(|(name, shape)| {
             let width: usize = shape.iter().product();
-            Field {
-                name,
-                shape,
-                data: vec![f64::NAN; states * width],
-            }
+            Field { name, shape, data: vec![f64::NAN; states * width] }
         });
-        let table = Table {
-            fields: fields.into(),
-            status: vec![Status::Ok; states],
-        };
+        let table = Table { fields: fields.into(), status: vec![Status::Ok; states] };
         (table, std::array::from_fn(FieldId))
     }
 
@@ -176,11 +169,7 @@ fn then(first: Status, second: impl FnOnce() -> Status) -> Status {
 }
 
 fn check_finite(values: &[f64]) -> Status {
-    if values.iter().all(|x| x.is_finite()) {
-        Status::Ok
-    } else {
-        Status::InvalidInput
-    }
+    if values.iter().all(|x| x.is_finite()) { Status::Ok } else { Status::InvalidInput }
 }
 
 fn stroke_status(mech: &Mechanism, pose: &Pose<f64>) -> Status {
@@ -197,11 +186,7 @@ pub fn inverse_kinematics(mech: &Mechanism, poses: &[f64]) -> Table {
     let (states, legs) = (poses.len() / 16, mech.legs.len());
     let (mut table, [lengths, vectors, directions]) = Table::new(
         states,
-        [
-            ("lengths", vec![legs]),
-            ("vectors", vec![legs, 3]),
-            ("directions", vec![legs, 3]),
-        ],
+        [("lengths", vec![legs]), ("vectors", vec![legs, 3]), ("directions", vec![legs, 3])],
     );
     for i in 0..states {
         let (pose, mut status) = read_pose(mech, poses, i);
@@ -238,11 +223,7 @@ pub fn hessians(mech: &Mechanism, poses: &[f64]) -> Table {
     let states = poses.len() / 16;
     let (mut table, [layers]) = Table::new(states, [("hessian", vec![6, 6, 6])]);
     for i in 0..states {
-        for (k, row) in jacobian::hessian(mech, &raw_pose(poses, i))
-            .as_flattened()
-            .iter()
-            .enumerate()
-        {
+        for (k, row) in jacobian::hessian(mech, &raw_pose(poses, i)).as_flattened().iter().enumerate() {
             table.set(layers, i, k, row);
         }
     }
@@ -351,13 +332,8 @@ impl Loads<'_> {
 #[must_use]
 pub fn inverse_dynamics(mech: &Mechanism, states: &States, loads: &Loads) -> Table {
     let n = states.len();
-    let (mut table, [forces, multipliers]) = Table::new(
-        n,
-        [
-            ("forces", vec![mech.legs.len()]),
-            ("constraint", vec![mech.independent.len()]),
-        ],
-    );
+    let (mut table, [forces, multipliers]) =
+        Table::new(n, [("forces", vec![mech.legs.len()]), ("constraint", vec![mech.independent.len()])]);
     for i in 0..n {
         let (pose, twist, acceleration, status) = states.read(mech, i);
         let load = loads.at(mech, &pose, i);
@@ -443,9 +419,7 @@ pub fn platform_acceleration(
 }
 
 fn actuated_values(mech: &Mechanism, values: &[f64], i: usize) -> Vec<f64> {
-    mech.actuated()
-        .map(|(k, _)| values[i * mech.legs.len() + k])
-        .collect()
+    mech.actuated().map(|(k, _)| values[i * mech.legs.len() + k]).collect()
 }
 
 /// Forces on the platform at the ends of two coupled legs, and the torque on their rod, from the multiplier \[T16\].
@@ -511,26 +485,13 @@ pub fn power(mech: &Mechanism, states: &States, loads: &Loads) -> Table {
         let rates = mech
             .actuated()
             .map(|(_, leg)| leg::motion(&leg::position(leg, &pose), &twist, &acceleration).rate);
-        let actuators = if singular {
-            f64::NAN
-        } else {
-            rates.zip(&f).map(|(rate, f)| rate * f).sum()
-        };
+        let actuators = if singular { f64::NAN } else { rates.zip(&f).map(|(rate, f)| rate * f).sum() };
         // What the efficiency takes: actuators serve the platform's term 1/η times.
         let without_legs = platform_power(mech, &pose, &twist, &acceleration, load_wrench);
         let friction = (1.0 / mech.efficiency - 1.0) * without_legs;
         let residual = actuators + load + damping + friction - kinetic.d - potential.d;
-        let values = [
-            kinetic.x,
-            potential.x,
-            kinetic.d,
-            potential.d,
-            actuators,
-            load,
-            damping,
-            friction,
-            residual,
-        ];
+        let values =
+            [kinetic.x, potential.x, kinetic.d, potential.d, actuators, load, damping, friction, residual];
         for (id, value) in ids.iter().zip(values) {
             table.set(*id, i, 0, &[value]);
         }
@@ -573,10 +534,7 @@ fn energy_along(
 #[must_use]
 pub fn conditioning(mech: &Mechanism, poses: &[f64]) -> Table {
     let n = poses.len() / 16;
-    let (mut table, ids) = Table::new(
-        n,
-        ["sigma_min", "sigma_max", "condition"].map(|name| (name, vec![])),
-    );
+    let (mut table, ids) = Table::new(n, ["sigma_min", "sigma_max", "condition"].map(|name| (name, vec![])));
     for i in 0..n {
         let (pose, status) = read_pose(mech, poses, i);
         table.status[i] = status;
@@ -618,10 +576,9 @@ pub fn states(mech: &Mechanism, input: &Coordinates, n: usize) -> Table {
             ("coordinate_second_rates", vec![names.len()]),
         ],
     );
-    let mask: Vec<bool> = (0..MAX_COORDINATES)
-        .map(|k| k >= names.len() || input.given[k].is_some())
-        .collect();
-    let mut last = mech.home;
+    let mask: Vec<bool> =
+        (0..MAX_COORDINATES).map(|k| k >= names.len() || input.given[k].is_some()).collect();
+    let (mut last, mut branch) = (mech.home, f64::NAN);
     for i in 0..n {
         let q: Values<Jet<f64>> = std::array::from_fn(|k| match input.given.get(k).copied().flatten() {
             Some([x, d, dd]) => Jet::new(x[i], d[i], dd[i]),
@@ -635,11 +592,12 @@ pub fn states(mech: &Mechanism, input: &Coordinates, n: usize) -> Table {
             _ => last,
         };
         let state = coordinates::state(mech, &input.set, &q, &mask, input.branch, &guess);
-        table.status[i] = state.status;
-        let solved = matches!(state.status, Status::Ok | Status::Fold);
+        let jumped = input.continued && state.status == Status::Ok && state.branch * branch < 0.0;
+        table.status[i] = if jumped { Status::BranchJump } else { state.status };
+        let solved = matches!(table.status[i], Status::Ok | Status::Fold);
         if solved {
             if state.status == Status::Ok {
-                last = state.pose;
+                (last, branch) = (state.pose, state.branch);
             }
             let (r, o) = (state.pose.rotation.rows(), state.pose.o.array());
             for k in 0..3 {
@@ -647,7 +605,7 @@ pub fn states(mech: &Mechanism, input: &Coordinates, n: usize) -> Table {
             }
             table.set(poses, i, 3, &[0.0, 0.0, 0.0, 1.0]);
         }
-        if state.status == Status::Ok {
+        if table.status[i] == Status::Ok {
             table.set(twists, i, 0, &state.twist.array());
             table.set(accelerations, i, 0, &state.acceleration.array());
         }

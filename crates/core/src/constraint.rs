@@ -57,10 +57,7 @@ pub fn of_leg(index: usize, leg: &Leg) -> Vec<Constraint> {
     let b = below.iter().map(|&a| make(ConstraintKind::B, a, none));
     let c = above.iter().map(|&a| make(ConstraintKind::C, none, a));
     let d = |base_axis, platform_axis| make(ConstraintKind::D, base_axis, platform_axis);
-    let (base, platform) = (
-        normal_of(leg.base.kind, &leg.base),
-        normal_of(leg.platform.kind, &leg.platform),
-    );
+    let (base, platform) = (normal_of(leg.base.kind, &leg.base), normal_of(leg.platform.kind, &leg.platform));
     match (base, platform) {
         (None, _) | (_, None) => b.chain(c).collect(),
         (Some(Normal::Across(u)), Some(Normal::Across(w))) => vec![make(ConstraintKind::A, u, w)],
@@ -127,9 +124,7 @@ fn vectors<T: Real>(c: &Constraint, pose: &Pose<T>) -> Vectors<T> {
 /// g(pose): metres for kinds A, B and C, a cosine for D \[T9\].
 #[inline(always)]
 pub fn value<T: Real>(c: &Constraint, pose: &Pose<T>) -> T {
-    let Vectors {
-        r, base, platform, ..
-    } = vectors(c, pose);
+    let Vectors { r, base, platform, .. } = vectors(c, pose);
     match c.kind {
         ConstraintKind::A => platform.cross(r).dot(base),
         ConstraintKind::B => r.dot(base),

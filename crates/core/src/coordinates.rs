@@ -5,7 +5,7 @@
 //! place with trigonometry.
 
 use crate::constraint::{self, ConstraintKind};
-use crate::linear::solve;
+use crate::linear::{Solved, solve};
 use crate::mechanism::{MAX_CONSTRAINTS, Mechanism};
 use crate::mobility::count;
 use crate::real::{Dual, Jet, Real, Trig};
@@ -109,10 +109,7 @@ impl Set {
         match self {
             Set::Paper(plane) => {
                 // [Eq. 2] R in the order XYX, o = (X_o, Y_o, Z_o)
-                Pose {
-                    rotation: plane.rotation(q[3], q[4], q[5]),
-                    o: Vec3::new(q[0], q[1], q[2]),
-                }
+                Pose { rotation: plane.rotation(q[3], q[4], q[5]), o: Vec3::new(q[0], q[1], q[2]) }
             }
             Set::Natural(plane) => {
                 // [T20] middle of b_1 b_3 = point of L + p L + h Rx(α) e_z
@@ -121,10 +118,7 @@ impl Set {
                 let (s, c) = alpha.sin_cos();
                 let middle =
                     Vec3::lift(plane.base_point) + Mat3::lift(plane.base) * Vec3::new(p, -(h * s), h * c);
-                Pose {
-                    rotation,
-                    o: middle - rotation * Vec3::lift(plane.platform_point),
-                }
+                Pose { rotation, o: middle - rotation * Vec3::lift(plane.platform_point) }
             }
             Set::Tool => {
                 // [T21] R = (home axis → axis) (turn about the home axis) R_home
@@ -133,19 +127,13 @@ impl Set {
                 let direction = Vec3::new(i, j, k).unit();
                 let tilt = Mat3::shortest_turn(Vec3::lift(home_axis), direction);
                 let rotation = tilt * turn_about(home_axis, turn) * Mat3::lift(mech.home.rotation);
-                Pose {
-                    rotation,
-                    o: Vec3::new(x, y, z) - rotation * Vec3::lift(mech.tool_point),
-                }
+                Pose { rotation, o: Vec3::new(x, y, z) - rotation * Vec3::lift(mech.tool_point) }
             }
             Set::Pose => {
                 let turn = Mat3::rotation_x(q[3].sin_cos())
                     * Mat3::rotation_y(q[4].sin_cos())
                     * Mat3::rotation_z(q[5].sin_cos());
-                Pose {
-                    rotation: turn,
-                    o: Vec3::new(q[0], q[1], q[2]),
-                }
+                Pose { rotation: turn, o: Vec3::new(q[0], q[1], q[2]) }
             }
         }
     }
@@ -216,11 +204,7 @@ impl Plane {
             .collect();
         let share = 1.0 / count(sharing.len());
         let mean = |point: fn(&constraint::Constraint) -> Vec3<f64>| {
-            sharing
-                .iter()
-                .map(|d| point(d))
-                .fold(Vec3::zero(), |sum, p| sum + p)
-                * share
+            sharing.iter().map(|d| point(d)).fold(Vec3::zero(), |sum, p| sum + p) * share
         };
         Some(Plane {
             base: frame_along(c.base_axis),
@@ -299,6 +283,8 @@ pub struct State {
     pub pose: Pose<f64>,
     pub twist: Twist<f64>,
     pub acceleration: Acceleration<f64>,
+    /// Which of several solutions the dependent coordinates are: the sign of sin γ, or of det ∂g/∂y \[T23\].
+    pub branch: f64,
     pub status: Status,
 }
 
@@ -316,27 +302,23 @@ pub fn state(
     guess: &Pose<f64>,
 ) -> State {
     let mut q = *q;
-    let finite = q
-        .iter()
-        .zip(given)
-        .all(|(c, g)| !g || (c.x.is_finite() && c.d.is_finite() && c.dd.is_finite()));
-    let status = if finite {
+    let finite =
+        q.iter().zip(given).all(|(c, g)| !g || (c.x.is_finite() && c.d.is_finite() && c.dd.is_finite()));
+    let (status, branch) = if finite {
         match set {
-            Set::Paper(plane) => branch_of_gamma(plane, &mut q, branch),
+            Set::Paper(plane) => (branch_of_gamma(plane, &mut q, branch), branch),
             _ => solve_dependent(mech, set, &mut q, given, guess),
         }
     } else {
-        Status::InvalidInput
+        (Status::InvalidInput, f64::NAN)
     };
     let pose = set.pose(mech, &q);
     let mut state = State {
         coordinates: q,
-        pose: Pose {
-            rotation: Mat3(pose.rotation.0.map(|c| c.map(|j| j.x))),
-            o: pose.o.map(|j| j.x),
-        },
+        pose: Pose { rotation: Mat3(pose.rotation.0.map(|c| c.map(|j| j.x))), o: pose.o.map(|j| j.x) },
         twist: Twist::new(pose.o.map(|j| j.d), half_cross(&pose.rotation, |j| j.d)),
         acceleration: Acceleration::new(pose.o.map(|j| j.dd), half_cross(&pose.rotation, |j| j.dd)),
+        branch,
         status,
     };
     if status == Status::Ok && state.pose.rotation.0.iter().any(|c| !c.norm().is_finite()) {
@@ -347,10 +329,7 @@ pub fn state(
 
 /// `½ Σ x_i × x_i'` over the columns of R is ω, `½ Σ x_i × x_i''` is ε \[T19\].
 fn half_cross(r: &Mat3<Jet<f64>>, part: fn(Jet<f64>) -> f64) -> Vec3<f64> {
-    r.0.iter()
-        .map(|c| c.map(|j| j.x).cross(c.map(part)))
-        .fold(Vec3::zero(), |sum, w| sum + w)
-        * 0.5
+    r.0.iter().map(|c| c.map(|j| j.x).cross(c.map(part))).fold(Vec3::zero(), |sum, w| sum + w) * 0.5
 }
 
 /// γ from [Eq. 5]: `γ = ± arccos(...)`, the sign being the branch.
@@ -375,17 +354,18 @@ fn branch_of_gamma(plane: &Plane, q: &mut Values<Jet<f64>>, branch: f64) -> Stat
 type System = [f64; MAX_CONSTRAINTS];
 
 /// Newton on the independent constraints for the coordinates that are not given, then their rates and second rates
-/// from the same matrix: `G_y y' = -ġ(y' = 0)`, `G_y y'' = -g̈(y'' = 0)` \[T23\].
+/// from the same matrix: `G_y y' = -ġ(y' = 0)`, `G_y y'' = -g̈(y'' = 0)` \[T23\]. Returns the sign of det G_y too: it
+/// tells apart the solutions that meet in a fold.
 fn solve_dependent(
     mech: &Mechanism,
     set: &Set,
     q: &mut Values<Jet<f64>>,
     given: &[bool],
     guess: &Pose<f64>,
-) -> Status {
+) -> (Status, f64) {
     let dependent: Vec<usize> = (0..set.names().len()).filter(|&i| !given[i]).collect();
     if dependent.is_empty() {
-        return Status::Ok;
+        return (Status::Ok, 1.0);
     }
     let start = set.values(mech, guess);
     for &i in &dependent {
@@ -395,28 +375,19 @@ fn solve_dependent(
     let residual = |q: &Values<Jet<f64>>| -> System {
         let pose = set.pose(mech, &q.map(|c| c.x));
         std::array::from_fn(|k| {
-            mech.independent
-                .get(k)
-                .map_or(0.0, |c| constraint::value(c, &pose) / unit(c, scale))
+            mech.independent.get(k).map_or(0.0, |c| constraint::value(c, &pose) / unit(c, scale))
         })
     };
-    let size = |g: &System| {
-        g.iter().fold(
-            0.0_f64,
-            |m, e| if e.abs() > m || e.is_nan() { e.abs() } else { m },
-        )
-    };
+    let size =
+        |g: &System| g.iter().fold(0.0_f64, |m, e| if e.abs() > m || e.is_nan() { e.abs() } else { m });
 
     let mut g = residual(q);
     let mut converged = false;
     for _ in 0..NEWTON_STEPS {
-        let (step, _) = solve(gradient(mech, set, q, &dependent), g.map(|e| -e));
+        let step = solve(gradient(mech, set, q, &dependent), g.map(|e| -e)).x;
         // No coordinate moves by more than half a radian or half the characteristic length at once.
-        let largest = dependent
-            .iter()
-            .zip(&step)
-            .map(|(&i, s)| s.abs() / reach(set, i, scale))
-            .fold(0.0, f64::max);
+        let largest =
+            dependent.iter().zip(&step).map(|(&i, s)| s.abs() / reach(set, i, scale)).fold(0.0, f64::max);
         if !size(&step).is_finite() {
             break;
         }
@@ -442,33 +413,31 @@ fn solve_dependent(
         for &i in &dependent {
             q[i] = Jet::new(f64::NAN, f64::NAN, f64::NAN);
         }
-        return Status::NotConverged;
+        return (Status::NotConverged, f64::NAN);
     }
     let matrix = gradient(mech, set, q, &dependent);
-    let rates = |q: &Values<Jet<f64>>, part: fn(Jet<f64>) -> f64| -> (System, f64) {
+    let rates = |q: &Values<Jet<f64>>, part: fn(Jet<f64>) -> f64| -> Solved<f64, MAX_CONSTRAINTS> {
         let pose = set.pose(mech, q);
         let rhs = std::array::from_fn(|k| {
-            mech.independent
-                .get(k)
-                .map_or(0.0, |c| -part(constraint::value(c, &pose)) / unit(c, scale))
+            mech.independent.get(k).map_or(0.0, |c| -part(constraint::value(c, &pose)) / unit(c, scale))
         });
         solve(matrix, rhs)
     };
-    let (first, pivots) = rates(q, |j| j.d);
-    if !(pivots > DEPENDENT_PIVOTS) {
+    let first = rates(q, |j| j.d);
+    if !(first.pivots > DEPENDENT_PIVOTS) {
         for &i in &dependent {
             q[i] = Jet::new(q[i].x, f64::NAN, f64::NAN);
         }
-        return Status::Fold;
+        return (Status::Fold, f64::NAN);
     }
-    for (&i, d) in dependent.iter().zip(&first) {
+    for (&i, d) in dependent.iter().zip(&first.x) {
         q[i].d = *d;
     }
-    let (second, _) = rates(q, |j| j.dd);
-    for (&i, dd) in dependent.iter().zip(&second) {
+    let second = rates(q, |j| j.dd);
+    for (&i, dd) in dependent.iter().zip(&second.x) {
         q[i].dd = *dd;
     }
-    Status::Ok
+    (Status::Ok, first.sign)
 }
 
 /// What makes a constraint's value a pure number.

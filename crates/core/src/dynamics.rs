@@ -47,10 +47,8 @@ pub fn platform_wrench<T: Real>(
     let force = inertial_force(body, Vec3::lift(mech.gravity), a);
     let torque = inertial_torque(body, pose.rotation, twist.omega, acceleration.eps);
     // f_d = -μ v, t_d = -μ ω
-    let damping = Wrench::new(
-        -(twist.v * T::lit(mech.linear_damping)),
-        -(twist.omega * T::lit(mech.angular_damping)),
-    );
+    let damping =
+        Wrench::new(-(twist.v * T::lit(mech.linear_damping)), -(twist.omega * T::lit(mech.angular_damping)));
     Wrench::at(center, force) + Wrench::new(Vec3::zero(), torque) + damping
 }
 
@@ -73,9 +71,7 @@ fn leg_wrench<T: Real>(
     let (piston, cylinder) = (leg::piston(leg, &m, &f, &turn), leg::cylinder(leg, &f, &turn));
     let force = inertial_force(&leg.piston, gravity, piston.acceleration);
     let torque = piston.offset.cross(force)
-        + cylinder
-            .offset
-            .cross(inertial_force(&leg.cylinder, gravity, cylinder.acceleration))
+        + cylinder.offset.cross(inertial_force(&leg.cylinder, gravity, cylinder.acceleration))
         + inertial_torque(&leg.piston, f.axes, turn.omega, turn.eps)
         + inertial_torque(&leg.cylinder, f.axes, turn.omega, turn.eps);
     let mut wrench = leg::carry(leg, &p, &f, force, torque);
@@ -136,10 +132,8 @@ pub fn inverse_dynamics<T: Real>(
 ) -> ([T; 6], f64) {
     let w = resultant(mech, pose, twist, acceleration, load);
     let scaled = Wrench::new(w.force, w.torque * T::lit(1.0 / mech.characteristic_length));
-    solve(
-        transposed(&scaled_jacobian(mech, pose)),
-        scaled.array().map(|x| -x),
-    )
+    let solved = solve(transposed(&scaled_jacobian(mech, pose)), scaled.array().map(|x| -x));
+    (solved.x, solved.pivots)
 }
 
 #[inline(always)]
@@ -175,32 +169,14 @@ pub fn energy<T: Real>(mech: &Mechanism, pose: &Pose<T>, twist: &Twist<T>) -> (T
         let turn = leg::turn(leg, pose, &p, &m, &f, twist, &rest);
         let base = Vec3::lift(leg.base.point);
         let (piston, cylinder) = (leg::piston(leg, &m, &f, &turn), leg::cylinder(leg, &f, &turn));
-        add(link(
-            &leg.piston,
-            f.axes,
-            turn.omega,
-            piston.velocity,
-            base + p.r + piston.offset,
-        ));
-        add(link(
-            &leg.cylinder,
-            f.axes,
-            turn.omega,
-            cylinder.velocity,
-            base + cylinder.offset,
-        ));
+        add(link(&leg.piston, f.axes, turn.omega, piston.velocity, base + p.r + piston.offset));
+        add(link(&leg.cylinder, f.axes, turn.omega, cylinder.velocity, base + cylinder.offset));
         for rod in mech.rods.iter().filter(|rod| rod.leader == i) {
             let axis = Vec3::lift(rod.axis);
             let omega = axis * leg::rod_turn(axis, &m, &f, &turn).rate;
             let axes = Mat3::from_columns(axis, f.n(), axis.cross(f.n()));
             let center = axes * Vec3::lift(rod.body.center);
-            add(link(
-                &rod.body,
-                axes,
-                omega,
-                omega.cross(center),
-                Vec3::lift(rod.point) + center,
-            ));
+            add(link(&rod.body, axes, omega, omega.cross(center), Vec3::lift(rod.point) + center));
         }
     }
     sum
@@ -241,8 +217,5 @@ pub fn coupled_forces<T: Real>(
     } else {
         [f_c * d3 / length, -(f_c * d1 / length)]
     };
-    Coupled {
-        forces,
-        torque: forces[0] * d1,
-    }
+    Coupled { forces, torque: forces[0] * d1 }
 }

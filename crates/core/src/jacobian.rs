@@ -14,9 +14,7 @@ pub type Matrix6<T> = [[T; 6]; 6];
 #[inline(always)]
 pub fn jacobian<T: Real>(mech: &Mechanism, pose: &Pose<T>) -> Matrix6<T> {
     let mut rows = [Wrench::zero(); 6];
-    let legs = mech
-        .actuated()
-        .map(|(_, leg)| leg::row(&leg::position(leg, pose)));
+    let legs = mech.actuated().map(|(_, leg)| leg::row(&leg::position(leg, pose)));
     let constraints = mech.independent.iter().map(|c| constraint::row(c, pose));
     for (row, wrench) in rows.iter_mut().zip(legs.chain(constraints)) {
         *row = wrench;
@@ -43,9 +41,7 @@ fn unscaled<T: Real>(mech: &Mechanism, x: [T; 6]) -> [T; 6] {
 #[inline(always)]
 pub fn hessian<T: Real>(mech: &Mechanism, pose: &Pose<T>) -> [Hessian<T>; 6] {
     let mut layers = [[[T::zero(); 6]; 6]; 6];
-    let legs = mech
-        .actuated()
-        .map(|(_, leg)| leg::hessian(&leg::position(leg, pose)));
+    let legs = mech.actuated().map(|(_, leg)| leg::hessian(&leg::position(leg, pose)));
     let constraints = mech.independent.iter().map(|c| constraint::hessian(c, pose));
     for (layer, h) in layers.iter_mut().zip(legs.chain(constraints)) {
         *layer = h;
@@ -56,8 +52,8 @@ pub fn hessian<T: Real>(mech: &Mechanism, pose: &Pose<T>) -> [Hessian<T>; 6] {
 /// The platform's twist from the rates of the actuated legs, and the pivot ratio of J [Eq. 13].
 #[inline(always)]
 pub fn platform_twist<T: Real>(mech: &Mechanism, pose: &Pose<T>, rates: &[T]) -> (Twist<T>, f64) {
-    let (v, pivots) = solve(scaled_jacobian(mech, pose), padded(rates));
-    (Twist::from_array(unscaled(mech, v)), pivots)
+    let solved = solve(scaled_jacobian(mech, pose), padded(rates));
+    (Twist::from_array(unscaled(mech, solved.x)), solved.pivots)
 }
 
 /// The platform's acceleration from those of the actuated legs: `A = J⁻¹ (ℓ'' - Vᵀ H V)` [Eq. 19].
@@ -73,8 +69,8 @@ pub fn platform_acceleration<T: Real>(
     for (entry, h) in rhs.iter_mut().zip(hessian(mech, pose)) {
         *entry = *entry - quadratic(&h, &v);
     }
-    let (a, pivots) = solve(scaled_jacobian(mech, pose), rhs);
-    (Acceleration::from_array(unscaled(mech, a)), pivots)
+    let solved = solve(scaled_jacobian(mech, pose), rhs);
+    (Acceleration::from_array(unscaled(mech, solved.x)), solved.pivots)
 }
 
 /// `vᵀ h v`.

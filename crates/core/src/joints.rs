@@ -30,10 +30,7 @@ impl Zero {
         let p = leg::position(leg, home);
         let n = leg::frame(leg, home, &p).n();
         let seen = |a: Vec3<f64>| home.rotation.transpose_mul(a);
-        Zero {
-            base: (n, p.delta),
-            platform: (seen(n), seen(p.delta)),
-        }
+        Zero { base: (n, p.delta), platform: (seen(n), seen(p.delta)) }
     }
 }
 
@@ -49,14 +46,7 @@ pub fn angles(
     turn: &Turn<f64>,
 ) -> [JointAngles; 2] {
     let base = one(&leg.base, zero.base, &Mat3::identity(), p, f, turn.omega);
-    let mut platform = one(
-        &leg.platform,
-        zero.platform,
-        &pose.rotation,
-        p,
-        f,
-        turn.omega - twist.omega,
-    );
+    let mut platform = one(&leg.platform, zero.platform, &pose.rotation, p, f, turn.omega - twist.omega);
     // Seen from the leg the platform turns the other way.
     platform.angles = platform.angles.map(|a| -a);
     platform.rates = platform.rates.map(|a| -a);
@@ -77,11 +67,7 @@ fn one(
     let mut result = JointAngles {
         angles: [f64::NAN; 2],
         rates: [f64::NAN; 2],
-        cone: joint
-            .cone_axis
-            .cross(delta)
-            .norm()
-            .atan2(joint.cone_axis.dot(delta)),
+        cone: joint.cone_axis.cross(delta).norm().atan2(joint.cone_axis.dot(delta)),
     };
     match (joint.kind, joint.axis) {
         (JointKind::Universal, Some(u)) => {
@@ -100,8 +86,7 @@ fn one(
 
 /// The turn about `axis` that takes `from` to `to`.
 fn about(axis: Vec3<f64>, from: Vec3<f64>, to: Vec3<f64>) -> f64 {
-    to.dot(axis.cross(from))
-        .atan2(to.dot(from) - axis.dot(to) * axis.dot(from))
+    to.dot(axis.cross(from)).atan2(to.dot(from) - axis.dot(to) * axis.dot(from))
 }
 
 fn wrapped(angle: f64) -> f64 {

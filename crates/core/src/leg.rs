@@ -23,12 +23,7 @@ pub fn position<T: Real>(leg: &Leg, pose: &Pose<T>) -> Position<T> {
     let e = pose.rotation * Vec3::lift(leg.platform.point);
     let r = pose.o + e - Vec3::lift(leg.base.point);
     let length = r.norm();
-    Position {
-        e,
-        r,
-        length,
-        delta: r * (T::one() / length),
-    }
+    Position { e, r, length, delta: r * (T::one() / length) }
 }
 
 /// The wrench of a unit force of the actuator, a row of the Jacobian [Eq. 6].
@@ -46,13 +41,8 @@ pub fn hessian<T: Real>(p: &Position<T>) -> Hessian<T> {
     let inverse = T::one() / p.length;
     let axes = Mat3::<T>::identity().0;
     let across = |v: Vec3<T>| v - p.delta * p.delta.dot(v);
-    let columns: [Vec3<T>; 6] = std::array::from_fn(|i| {
-        if i < 3 {
-            across(axes[i])
-        } else {
-            across(axes[i - 3].cross(p.e))
-        }
-    });
+    let columns: [Vec3<T>; 6] =
+        std::array::from_fn(|i| if i < 3 { across(axes[i]) } else { across(axes[i - 3].cross(p.e)) });
     for i in 0..6 {
         for j in 0..6 {
             h[i][j] = columns[i].dot(columns[j]).mul_add(inverse, h[i][j]);
@@ -85,14 +75,7 @@ pub fn motion<T: Real>(p: &Position<T>, twist: &Twist<T>, acceleration: &Acceler
     // [Eq. 15] [T4] ℓ'' = δ·a_b + v_b·δ';  δ'' = (a_b - ℓ''δ - 2ℓ'δ')/ℓ
     let second = delta.dot(a_b) + v_b.dot(delta_rate);
     let delta_acceleration = (a_b - delta * second - delta_rate * (rate + rate)) * inverse;
-    Motion {
-        v_b,
-        a_b,
-        rate,
-        acceleration: second,
-        delta_rate,
-        delta_acceleration,
-    }
+    Motion { v_b, a_b, rate, acceleration: second, delta_rate, delta_acceleration }
 }
 
 /// The leg's frame at a pose, and what the spin needs of it \[T5\].
@@ -130,12 +113,7 @@ pub fn frame<T: Real>(leg: &Leg, pose: &Pose<T>, p: &Position<T>) -> Frame<T> {
         Turning::Free(_) => Vec3::zero(),
         Turning::Across(..) | Turning::Along(..) => p.delta.cross(n) * inverse,
     };
-    Frame {
-        axes: Mat3::from_columns(n, p.delta, n.cross(p.delta)),
-        u,
-        sine,
-        w,
-    }
+    Frame { axes: Mat3::from_columns(n, p.delta, n.cross(p.delta)), u, sine, w }
 }
 
 /// How the leg turns \[T6\].
@@ -205,10 +183,7 @@ pub fn carry<T: Real>(
     // M·ω_leg = (M×δ)·δ' + (M·δ) s, and s = N'·w is linear in δ' (through u×δ') and in ω_u (through u').
     let about = torque.dot(p.delta);
     let (direction, turning) = match leg.turning {
-        Turning::Across(side, _) => (
-            f.w.cross(f.u) * about,
-            (side, f.u.cross(p.delta.cross(f.w)) * about),
-        ),
+        Turning::Across(side, _) => (f.w.cross(f.u) * about, (side, f.u.cross(p.delta.cross(f.w)) * about)),
         Turning::Along(side, _) => (Vec3::zero(), (side, f.u.cross(f.w) * about)),
         Turning::Free(_) => (Vec3::zero(), (crate::mechanism::Side::Base, Vec3::zero())),
     };
@@ -253,12 +228,7 @@ pub fn piston<T: Real>(leg: &Leg, m: &Motion<T>, f: &Frame<T>, turn: &Turn<T>) -
 /// The cylinder's mass centre, offset from B [Eq. 38, 39].
 #[inline(always)]
 pub fn cylinder<T: Real>(leg: &Leg, f: &Frame<T>, turn: &Turn<T>) -> PointMotion<T> {
-    point_motion(
-        turn,
-        f.axes * Vec3::lift(leg.cylinder.center),
-        Vec3::zero(),
-        Vec3::zero(),
-    )
+    point_motion(turn, f.axes * Vec3::lift(leg.cylinder.center), Vec3::zero(), Vec3::zero())
 }
 
 /// How a rod turns about its own line, from the leg that leads it \[T7\].

@@ -2,12 +2,21 @@
 
 use crate::real::Real;
 
+/// A solution, and what the elimination tells of the matrix.
+#[derive(Clone, Copy, Debug)]
+pub struct Solved<T, const N: usize> {
+    pub x: [T; N],
+    /// Ratio of the smallest to the largest pivot: zero (or NaN) where the matrix is singular, of the order of the
+    /// reciprocal condition number elsewhere.
+    pub pivots: f64,
+    /// Sign of the determinant.
+    pub sign: f64,
+}
+
 /// Solves `m x = rhs` by Gaussian elimination with partial pivoting, rows exchanged by [`Real::select`].
-///
-/// Returns `x` and the ratio of the smallest to the largest pivot: zero (or NaN) where `m` is singular, of the order
-/// of the reciprocal condition number elsewhere.
 #[inline(always)]
-pub fn solve<T: Real, const N: usize>(mut m: [[T; N]; N], mut rhs: [T; N]) -> ([T; N], f64) {
+pub fn solve<T: Real, const N: usize>(mut m: [[T; N]; N], mut rhs: [T; N]) -> Solved<T, N> {
+    let mut sign = 1.0_f64;
     for k in 0..N {
         // Bubble the largest entry of column k up to the diagonal.
         for i in k + 1..N {
@@ -17,6 +26,7 @@ pub fn solve<T: Real, const N: usize>(mut m: [[T; N]; N], mut rhs: [T; N]) -> ([
                 m[k][j] = T::select(larger, b, a);
                 m[i][j] = T::select(larger, a, b);
             }
+            sign = if larger { -sign } else { sign };
             let (a, b) = (rhs[k], rhs[i]);
             rhs[k] = T::select(larger, b, a);
             rhs[i] = T::select(larger, a, b);
@@ -37,10 +47,11 @@ pub fn solve<T: Real, const N: usize>(mut m: [[T; N]; N], mut rhs: [T; N]) -> ([
             sum = (-m[k][j]).mul_add(rhs[j], sum);
         }
         rhs[k] = sum / m[k][k];
-        let pivot = m[k][k].value().abs();
-        pivots = (pivots.0.min(pivot), pivots.1.max(pivot));
+        let pivot = m[k][k].value();
+        sign *= pivot.signum();
+        pivots = (pivots.0.min(pivot.abs()), pivots.1.max(pivot.abs()));
     }
-    (rhs, pivots.0 / pivots.1)
+    Solved { x: rhs, pivots: pivots.0 / pivots.1, sign }
 }
 
 #[cfg(test)]
@@ -52,13 +63,14 @@ mod tests {
         let m = [[0.0, 2.0, 1.0], [1.0, 0.0, 0.0], [3.0, 0.0, 1.0]];
         let x = [1.5, -2.0, 0.25];
         let rhs = m.map(|row: [f64; 3]| row[0] * x[0] + row[1] * x[1] + row[2] * x[2]);
-        let (found, pivots) = solve(m, rhs);
-        assert!(found.iter().zip(x).all(|(a, b)| (a - b).abs() < 1e-15) && pivots > 0.1);
+        let found = solve(m, rhs);
+        assert!(found.x.iter().zip(x).all(|(a, b)| (a - b).abs() < 1e-15) && found.pivots > 0.1);
+        assert_eq!(found.sign, -1.0, "the determinant is -2");
     }
 
     #[test]
     fn a_singular_matrix_shows_in_the_pivots() {
-        let (_, pivots) = solve([[1.0, 2.0], [2.0, 4.0]], [1.0, 1.0]);
+        let pivots = solve([[1.0, 2.0], [2.0, 4.0]], [1.0, 1.0]).pivots;
         assert!(pivots < 1e-15 || pivots.is_nan());
     }
 }

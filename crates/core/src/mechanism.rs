@@ -19,18 +19,11 @@ pub struct Body {
 
 impl Body {
     fn new(spec: Option<&BodySpec>) -> Self {
-        spec.map_or(
-            Body {
-                mass: 0.0,
-                center: Vec3::zero(),
-                inertia: Mat3([Vec3::zero(); 3]),
-            },
-            |b| Body {
-                mass: b.mass,
-                center: b.center,
-                inertia: Mat3::from_rows(b.inertia),
-            },
-        )
+        spec.map_or(Body { mass: 0.0, center: Vec3::zero(), inertia: Mat3([Vec3::zero(); 3]) }, |b| Body {
+            mass: b.mass,
+            center: b.center,
+            inertia: Mat3::from_rows(b.inertia),
+        })
     }
 }
 
@@ -88,11 +81,7 @@ impl Leg {
     /// Letters of its joints from base to platform, `RPU` for one on a rod.
     #[must_use]
     pub fn letters(&self) -> String {
-        let base = if self.rod.is_some() {
-            "R"
-        } else {
-            self.base.kind.letter()
-        };
+        let base = if self.rod.is_some() { "R" } else { self.base.kind.letter() };
         format!("{base}P{}", self.platform.kind.letter())
     }
 }
@@ -152,10 +141,10 @@ impl Mechanism {
     pub fn new(spec: &Spec) -> Result<Self, Vec<Fault>> {
         let mut faults = spec.check();
         let sound = faults.is_empty();
-        let home = spec.home.as_ref().map(|h| Pose {
-            rotation: Mat3::from_rotation_vector(h.rotation_vector),
-            o: h.position,
-        });
+        let home = spec
+            .home
+            .as_ref()
+            .map(|h| Pose { rotation: Mat3::from_rotation_vector(h.rotation_vector), o: h.position });
         faults.extend(check_rods(spec));
         faults.extend(check_ends(spec));
         if let Some(home) = &home {
@@ -173,36 +162,18 @@ impl Mechanism {
             return Err(faults);
         };
 
-        let rods: Vec<Rod> = spec
-            .rods
-            .iter()
-            .flatten()
-            .enumerate()
-            .map(|(i, rod)| make_rod(spec, i, rod))
-            .collect();
-        let legs: Vec<Leg> = spec
-            .legs
-            .iter()
-            .flatten()
-            .map(|leg| make_leg(leg, &rods, &home))
-            .collect();
-        let constraints: Vec<Constraint> = legs
-            .iter()
-            .enumerate()
-            .flat_map(|(i, leg)| constraint::of_leg(i, leg))
-            .collect();
-        let reach: f64 = legs
-            .iter()
-            .map(|leg| leg.platform.point.dot(leg.platform.point))
-            .sum();
+        let rods: Vec<Rod> =
+            spec.rods.iter().flatten().enumerate().map(|(i, rod)| make_rod(spec, i, rod)).collect();
+        let legs: Vec<Leg> = spec.legs.iter().flatten().map(|leg| make_leg(leg, &rods, &home)).collect();
+        let constraints: Vec<Constraint> =
+            legs.iter().enumerate().flat_map(|(i, leg)| constraint::of_leg(i, leg)).collect();
+        let reach: f64 = legs.iter().map(|leg| leg.platform.point.dot(leg.platform.point)).sum();
         let mean_square = reach / mobility::count(legs.len());
         // A platform that is a point has no size of its own; the home lengths then set the scale.
         let characteristic_length = if mean_square > 0.0 {
             mean_square.sqrt()
         } else {
-            legs.iter()
-                .map(|leg| leg::position(leg, &home).length)
-                .fold(0.0, f64::max)
+            legs.iter().map(|leg| leg::position(leg, &home).length).fold(0.0, f64::max)
         };
 
         let mut mech = Mechanism {
@@ -214,10 +185,7 @@ impl Mechanism {
             efficiency: spec.efficiency,
             linear_damping: spec.linear_damping,
             angular_damping: spec.angular_damping,
-            load: Load {
-                wrench: Wrench::new(spec.load.force, spec.load.torque),
-                axes: spec.load.axes,
-            },
+            load: Load { wrench: Wrench::new(spec.load.force, spec.load.torque), axes: spec.load.axes },
             home,
             tool_point: spec.tool.point,
             tool_axis: spec.tool.axis.unit(),
@@ -241,10 +209,7 @@ impl Mechanism {
         let actuators = mech.legs.iter().filter(|leg| leg.actuated).count();
         let dof = mech.dof();
         if dof == 0 {
-            faults.push(Fault::new(
-                "legs",
-                "together they leave the platform no freedom; release a joint",
-            ));
+            faults.push(Fault::new("legs", "together they leave the platform no freedom; release a joint"));
         } else if actuators < dof {
             faults.push(Fault::new(
                 "legs",
@@ -289,10 +254,8 @@ fn check_rods(spec: &Spec) -> Vec<Fault> {
         let Some(rod) = rod else { continue };
         let carried = |leg: &&LegSpec| leg.base.rod == Some(i);
         if spec.legs.iter().all(Option::is_some) && !spec.legs.iter().flatten().any(|leg| carried(&leg)) {
-            faults.push(Fault::new(
-                format!("rods.{}", i + 1),
-                "carries no leg; name it in a leg's base joint",
-            ));
+            faults
+                .push(Fault::new(format!("rods.{}", i + 1), "carries no leg; name it in a leg's base joint"));
         }
         for (j, leg) in spec.legs.iter().enumerate() {
             let Some(leg) = leg.as_ref().filter(carried) else {
@@ -334,10 +297,7 @@ fn check_ends(spec: &Spec) -> Vec<Fault> {
             if same(a.base.point, b.base.point) && same(a.platform.point, b.platform.point) {
                 faults.push(Fault::new(
                     format!("legs.{}", j + 1),
-                    format!(
-                        "its base point and platform point coincide with those of legs.{}",
-                        i + 1
-                    ),
+                    format!("its base point and platform point coincide with those of legs.{}", i + 1),
                 ));
             }
         }
@@ -351,26 +311,14 @@ fn check_leg_at_home(spec: &Spec, place: &str, leg: &LegSpec, home: &Pose<f64>) 
     let e = home.rotation * leg.platform.point;
     let r = home.o + e - leg.base.point;
     if r.norm() <= LENGTH_TOLERANCE * (leg.base.point.norm() + e.norm() + home.o.norm()) || r.norm() == 0.0 {
-        faults.push(Fault::new(
-            place,
-            "base point and platform point coincide at the home pose",
-        ));
+        faults.push(Fault::new(place, "base point and platform point coincide at the home pose"));
         return faults;
     }
     let delta = r.unit();
-    let rod_axis = leg
-        .base
-        .rod
-        .and_then(|i| spec.rods.get(i))
-        .and_then(Option::as_ref)
-        .map(|rod| rod.axis);
+    let rod_axis = leg.base.rod.and_then(|i| spec.rods.get(i)).and_then(Option::as_ref).map(|rod| rod.axis);
     let sides = [
         ("base", &leg.base, rod_axis.or(leg.base.axis)),
-        (
-            "platform",
-            &leg.platform,
-            leg.platform.axis.map(|a| home.rotation * a),
-        ),
+        ("platform", &leg.platform, leg.platform.axis.map(|a| home.rotation * a)),
     ];
     for (side, joint, axis) in sides {
         let Some(axis) = axis.filter(|a| a.norm() > 0.0).map(Vec3::unit) else {
@@ -378,20 +326,14 @@ fn check_leg_at_home(spec: &Spec, place: &str, leg: &LegSpec, home: &Pose<f64>) 
         };
         let (along, across) = (axis.dot(delta), axis.cross(delta).norm());
         let degrees = across.atan2(along).to_degrees();
-        let joint_kind = if joint.rod.is_some() {
-            JointKind::Universal
-        } else {
-            joint.joint
-        };
+        let joint_kind = if joint.rod.is_some() { JointKind::Universal } else { joint.joint };
         let (wrong, need) = match joint_kind {
-            JointKind::Universal => (
-                across <= ANGLE_TOLERANCE,
-                "the axis of a U joint (or its rod) must not lie along it",
-            ),
-            JointKind::Revolute => (
-                along.abs() > ANGLE_TOLERANCE,
-                "the axis of an R joint must be square to it",
-            ),
+            JointKind::Universal => {
+                (across <= ANGLE_TOLERANCE, "the axis of a U joint (or its rod) must not lie along it")
+            }
+            JointKind::Revolute => {
+                (along.abs() > ANGLE_TOLERANCE, "the axis of an R joint must be square to it")
+            }
             JointKind::Fixed => (
                 across > ANGLE_TOLERANCE || along < 0.0,
                 "the axis of an F joint must point along it, from B to b",
@@ -431,12 +373,7 @@ fn home_message(mech: &Mechanism, index: usize, missed: f64) -> String {
 }
 
 fn make_rod(spec: &Spec, index: usize, rod: &RodSpec) -> Rod {
-    let leader = spec
-        .legs
-        .iter()
-        .flatten()
-        .position(|leg| leg.base.rod == Some(index))
-        .unwrap_or(0);
+    let leader = spec.legs.iter().flatten().position(|leg| leg.base.rod == Some(index)).unwrap_or(0);
     Rod {
         name: rod.name.clone(),
         point: rod.point,
@@ -455,10 +392,7 @@ fn make_leg(spec: &LegSpec, rods: &[Rod], home: &Pose<f64>) -> Leg {
         base.axis = Some(rods[rod].axis);
     }
     let platform = make_joint(&spec.platform, home.rotation.transpose_mul(delta));
-    let turning = match (
-        turning_of(&base, Side::Base),
-        turning_of(&platform, Side::Platform),
-    ) {
+    let turning = match (turning_of(&base, Side::Base), turning_of(&platform, Side::Platform)) {
         (Some(turning), _) | (None, Some(turning)) => turning,
         (None, None) => Turning::Free(delta.perpendicular()),
     };
@@ -477,11 +411,7 @@ fn make_leg(spec: &LegSpec, rods: &[Rod], home: &Pose<f64>) -> Leg {
 }
 
 fn make_joint(spec: &JointSpec, direction: Vec3<f64>) -> Joint {
-    let cone_axis = spec
-        .cone
-        .as_ref()
-        .and_then(|c| c.axis)
-        .map_or(direction, Vec3::unit);
+    let cone_axis = spec.cone.as_ref().and_then(|c| c.axis).map_or(direction, Vec3::unit);
     Joint {
         kind: spec.joint,
         point: spec.point,

@@ -161,18 +161,11 @@ pub fn project(mech: &Mechanism, start: &Pose<f64>) -> Option<Pose<f64>> {
     let size = mech.characteristic_length;
     let mut pose = *start;
     for _ in 0..NEWTON_STEPS {
-        let rows: Vec<Wrench<f64>> = mech
-            .constraints
-            .iter()
-            .map(|c| constraint::row(c, &pose))
-            .collect();
+        let rows: Vec<Wrench<f64>> = mech.constraints.iter().map(|c| constraint::row(c, &pose)).collect();
         let sizes: Vec<f64> = rows.iter().map(|row| constraint::row_size(row, size)).collect();
         let residual = DVector::from_iterator(
             rows.len(),
-            mech.constraints
-                .iter()
-                .zip(&sizes)
-                .map(|(c, s)| constraint::value(c, &pose) / s),
+            mech.constraints.iter().zip(&sizes).map(|(c, s)| constraint::value(c, &pose) / s),
         );
         if residual.amax() <= 1e-13 * size {
             return Some(pose);
@@ -201,11 +194,7 @@ fn scaled_rows(rows: &[Wrench<f64>], sizes: &[f64], scale: f64) -> DMatrix<f64> 
 fn independent_rows(mech: &Mechanism, poses: &[Pose<f64>]) -> Vec<usize> {
     let size = mech.characteristic_length;
     let choose = |pose: &Pose<f64>| {
-        let rows: Vec<Wrench<f64>> = mech
-            .constraints
-            .iter()
-            .map(|c| constraint::row(c, pose))
-            .collect();
+        let rows: Vec<Wrench<f64>> = mech.constraints.iter().map(|c| constraint::row(c, pose)).collect();
         let sizes: Vec<f64> = rows.iter().map(|row| constraint::row_size(row, size)).collect();
         let all = scaled_rows(&rows, &sizes, size);
         let mut chosen: Vec<usize> = Vec::new();
@@ -270,12 +259,7 @@ fn closure(mech: &Mechanism, pose: &Pose<f64>) -> Closure {
             passive_legs.push(i);
         }
         if let Some(rod) = mech.legs[i].rod {
-            put(
-                &mut m,
-                i,
-                rod,
-                &Screw::turn(mech.rods[rod].axis, mech.rods[rod].point - pose.o),
-            );
+            put(&mut m, i, rod, &Screw::turn(mech.rods[rod].axis, mech.rods[rod].point - pose.o));
         }
         for k in 0..6 {
             m[(6 * i + k, own + mech.rods.len() + k)] = -1.0;
@@ -287,14 +271,9 @@ fn closure(mech: &Mechanism, pose: &Pose<f64>) -> Closure {
     let rank = svd.singular_values.iter().filter(|&&s| s > floor).count();
     let span = svd.u.map(|u| u.columns(0, rank).into_owned());
     let felt = |row: usize| span.as_ref().map_or(1.0, |u| u.row(row).norm_squared());
-    let redundant_legs = (0..legs.len())
-        .filter(|&leg| (0..6).any(|k| 1.0 - felt(6 * leg + k) > 1e-6))
-        .collect();
-    Closure {
-        rank,
-        redundant_legs,
-        passive_legs,
-    }
+    let redundant_legs =
+        (0..legs.len()).filter(|&leg| (0..6).any(|k| 1.0 - felt(6 * leg + k) > 1e-6)).collect();
+    Closure { rank, redundant_legs, passive_legs }
 }
 
 /// The twist of a unit joint rate, at o.
@@ -306,10 +285,7 @@ struct Screw {
 impl Screw {
     /// A turn about a line through o + point.
     fn turn(axis: Vec3<f64>, point: Vec3<f64>) -> Self {
-        Screw {
-            linear: point.cross(axis),
-            angular: axis,
-        }
+        Screw { linear: point.cross(axis), angular: axis }
     }
 }
 
@@ -318,10 +294,7 @@ fn leg_screws(leg: &Leg, pose: &Pose<f64>) -> Vec<Screw> {
     let p = leg::position(leg, pose);
     let n = leg::frame(leg, pose, &p).n();
     let below = leg.base.point - pose.o;
-    let (base, platform) = (
-        leg.base.axis.unwrap_or(n),
-        leg.platform.axis.map_or(n, |a| pose.rotation * a),
-    );
+    let (base, platform) = (leg.base.axis.unwrap_or(n), leg.platform.axis.map_or(n, |a| pose.rotation * a));
     let turns = |kind: JointKind, axis: Vec3<f64>| match kind {
         JointKind::Spherical => vec![Vec3::X, Vec3::Y, Vec3::Z],
         JointKind::Universal => vec![axis, n],
@@ -334,15 +307,8 @@ fn leg_screws(leg: &Leg, pose: &Pose<f64>) -> Vec<Screw> {
         base_turns.remove(0);
     }
     let mut screws: Vec<Screw> = base_turns.into_iter().map(|a| Screw::turn(a, below)).collect();
-    screws.push(Screw {
-        linear: p.delta * p.length,
-        angular: Vec3::zero(),
-    });
-    screws.extend(
-        turns(leg.platform.kind, platform)
-            .into_iter()
-            .map(|a| Screw::turn(a, p.e)),
-    );
+    screws.push(Screw { linear: p.delta * p.length, angular: Vec3::zero() });
+    screws.extend(turns(leg.platform.kind, platform).into_iter().map(|a| Screw::turn(a, p.e)));
     screws
 }
 
@@ -353,11 +319,7 @@ fn graph(mech: &Mechanism) -> Graph {
     let mut rods = Vec::new();
     for rod in &mech.rods {
         rods.push(names.len());
-        joints.push(GraphJoint {
-            kind: "R",
-            name: format!("rod {}", rod.name),
-            links: [0, names.len()],
-        });
+        joints.push(GraphJoint { kind: "R", name: format!("rod {}", rod.name), links: [0, names.len()] });
         names.push(format!("rod {}", rod.name));
     }
     for leg in &mech.legs {
@@ -369,21 +331,10 @@ fn graph(mech: &Mechanism) -> Graph {
             names.len() - 1
         };
         let ground = leg.rod.map_or(0, |rod| rods[rod]);
-        let (cylinder, piston) = (
-            link(leg.base.kind, 0, "cylinder"),
-            link(leg.platform.kind, 1, "piston"),
-        );
-        let below = if leg.rod.is_some() {
-            JointKind::Revolute
-        } else {
-            leg.base.kind
-        };
+        let (cylinder, piston) = (link(leg.base.kind, 0, "cylinder"), link(leg.platform.kind, 1, "piston"));
+        let below = if leg.rod.is_some() { JointKind::Revolute } else { leg.base.kind };
         let mut join = |kind: &'static str, place: &str, links| {
-            joints.push(GraphJoint {
-                kind,
-                name: format!("{place} {}", leg.name),
-                links,
-            });
+            joints.push(GraphJoint { kind, name: format!("{place} {}", leg.name), links });
         };
         if below != JointKind::Fixed {
             join(below.letter(), "base joint", [ground, cylinder]);
@@ -394,29 +345,17 @@ fn graph(mech: &Mechanism) -> Graph {
         }
     }
     let links = names.into_iter().enumerate().map(|(i, name)| {
-        let on = joints
-            .iter()
-            .enumerate()
-            .filter(|(_, j)| j.links.contains(&i))
-            .map(|(k, _)| k);
-        GraphLink {
-            joints: on.collect(),
-            name,
-        }
+        let on = joints.iter().enumerate().filter(|(_, j)| j.links.contains(&i)).map(|(k, _)| k);
+        GraphLink { joints: on.collect(), name }
     });
-    Graph {
-        links: links.collect(),
-        joints,
-    }
+    Graph { links: links.collect(), joints }
 }
 
 /// The two legs of a rod that carry one constraint together, with its axes in base and platform.
 #[must_use]
 pub fn coupled_pair(mech: &Mechanism) -> Option<([usize; 2], Vec3<f64>, Vec3<f64>)> {
     mech.rods.iter().enumerate().find_map(|(r, rod)| {
-        let on: Vec<usize> = (0..mech.legs.len())
-            .filter(|&i| mech.legs[i].rod == Some(r))
-            .collect();
+        let on: Vec<usize> = (0..mech.legs.len()).filter(|&i| mech.legs[i].rod == Some(r)).collect();
         let &[first, second] = on.as_slice() else {
             return None;
         };

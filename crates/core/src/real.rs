@@ -135,11 +135,7 @@ impl<const FMA: bool> Real for F<FMA> {
     }
     #[inline(always)]
     fn mul_add(self, a: Self, b: Self) -> Self {
-        if FMA {
-            F(self.0.mul_add(a.0, b.0))
-        } else {
-            F(self.0 * a.0 + b.0)
-        }
+        if FMA { F(self.0.mul_add(a.0, b.0)) } else { F(self.0 * a.0 + b.0) }
     }
 }
 
@@ -360,20 +356,11 @@ mod tests {
             assert!((jet.d - dual.d.x).abs() < 1e-13 && (jet.dd - dual.d.d).abs() < 1e-12);
             let error = |h: f64| {
                 let (f1, f0, f2) = (sample(t - h), sample(t), sample(t + h));
-                (
-                    ((f2 - f1) / (2.0 * h) - jet.d).abs(),
-                    ((f2 - 2.0 * f0 + f1) / (h * h) - jet.dd).abs(),
-                )
+                (((f2 - f1) / (2.0 * h) - jet.d).abs(), ((f2 - 2.0 * f0 + f1) / (h * h) - jet.dd).abs())
             };
             let (coarse, fine) = (error(2e-3), error(1e-3));
-            assert!(
-                (coarse.0 / fine.0 - 4.0).abs() < 0.1,
-                "rate at {t}: {coarse:?} {fine:?}"
-            );
-            assert!(
-                (coarse.1 / fine.1 - 4.0).abs() < 0.1,
-                "second rate at {t}: {coarse:?} {fine:?}"
-            );
+            assert!((coarse.0 / fine.0 - 4.0).abs() < 0.1, "rate at {t}: {coarse:?} {fine:?}");
+            assert!((coarse.1 / fine.1 - 4.0).abs() < 0.1, "second rate at {t}: {coarse:?} {fine:?}");
         }
     }
 

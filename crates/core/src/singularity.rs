@@ -21,30 +21,17 @@ pub struct Conditioning {
 pub fn conditioning(mech: &Mechanism, pose: &Pose<f64>) -> Conditioning {
     let scaled = |row: Wrench<f64>| (row.torque * (1.0 / mech.characteristic_length)).array();
     let matrix = |rows: Vec<Wrench<f64>>| {
-        DMatrix::from_fn(rows.len(), 6, |i, j| {
-            if j < 3 {
-                rows[i].array()[j]
-            } else {
-                scaled(rows[i])[j - 3]
-            }
-        })
+        DMatrix::from_fn(
+            rows.len(),
+            6,
+            |i, j| {
+                if j < 3 { rows[i].array()[j] } else { scaled(rows[i])[j - 3] }
+            },
+        )
     };
-    let legs = matrix(
-        mech.actuated()
-            .map(|(_, leg)| leg::row(&leg::position(leg, pose)))
-            .collect(),
-    );
-    let g = matrix(
-        mech.independent
-            .iter()
-            .map(|c| constraint::row(c, pose))
-            .collect(),
-    );
-    let none = Conditioning {
-        sigma_min: f64::NAN,
-        sigma_max: f64::NAN,
-        condition: f64::NAN,
-    };
+    let legs = matrix(mech.actuated().map(|(_, leg)| leg::row(&leg::position(leg, pose))).collect());
+    let g = matrix(mech.independent.iter().map(|c| constraint::row(c, pose)).collect());
+    let none = Conditioning { sigma_min: f64::NAN, sigma_max: f64::NAN, condition: f64::NAN };
     if legs.iter().chain(g.iter()).any(|e| !e.is_finite()) {
         return none;
     }
@@ -62,9 +49,5 @@ pub fn conditioning(mech: &Mechanism, pose: &Pose<f64>) -> Conditioning {
     let mut sigma: Vec<f64> = square.singular_values().iter().copied().collect();
     sigma.sort_by(|a, b| b.total_cmp(a));
     let (sigma_max, sigma_min) = (sigma[0], sigma[mech.dof() - 1]);
-    Conditioning {
-        sigma_min,
-        sigma_max,
-        condition: sigma_max / sigma_min,
-    }
+    Conditioning { sigma_min, sigma_max, condition: sigma_max / sigma_min }
 }

@@ -76,11 +76,7 @@ impl<T: Real> Vec3<T> {
 
     #[inline(always)]
     pub fn map<U>(self, f: impl Fn(T) -> U) -> Vec3<U> {
-        Vec3 {
-            x: f(self.x),
-            y: f(self.y),
-            z: f(self.z),
-        }
+        Vec3 { x: f(self.x), y: f(self.y), z: f(self.z) }
     }
 
     #[inline(always)]
@@ -90,21 +86,9 @@ impl<T: Real> Vec3<T> {
 }
 
 impl Vec3<f64> {
-    pub const X: Self = Vec3 {
-        x: 1.0,
-        y: 0.0,
-        z: 0.0,
-    };
-    pub const Y: Self = Vec3 {
-        x: 0.0,
-        y: 1.0,
-        z: 0.0,
-    };
-    pub const Z: Self = Vec3 {
-        x: 0.0,
-        y: 0.0,
-        z: 1.0,
-    };
+    pub const X: Self = Vec3 { x: 1.0, y: 0.0, z: 0.0 };
+    pub const Y: Self = Vec3 { x: 0.0, y: 1.0, z: 0.0 };
+    pub const Z: Self = Vec3 { x: 0.0, y: 0.0, z: 1.0 };
 
     /// A unit vector square to this one, on the side of the base axis that this one leans on least.
     #[must_use]
@@ -187,11 +171,7 @@ impl<T: Real> Mat3<T> {
     #[inline(always)]
     pub fn transpose(self) -> Self {
         let [a, b, c] = self.0;
-        Mat3([
-            Vec3::new(a.x, b.x, c.x),
-            Vec3::new(a.y, b.y, c.y),
-            Vec3::new(a.z, b.z, c.z),
-        ])
+        Mat3([Vec3::new(a.x, b.x, c.x), Vec3::new(a.y, b.y, c.y), Vec3::new(a.z, b.z, c.z)])
     }
 
     /// `Mᵀ a`.
@@ -257,21 +237,12 @@ impl Mat3<f64> {
     #[must_use]
     pub fn rotation_error(self) -> f64 {
         let [a, b, c] = self.0;
-        let products = [
-            a.dot(a) - 1.0,
-            b.dot(b) - 1.0,
-            c.dot(c) - 1.0,
-            a.dot(b),
-            b.dot(c),
-            c.dot(a),
-        ]
-        .map(f64::abs);
+        let products =
+            [a.dot(a) - 1.0, b.dot(b) - 1.0, c.dot(c) - 1.0, a.dot(b), b.dot(c), c.dot(a)].map(f64::abs);
         if a.cross(b).dot(c) <= 0.0 {
             return f64::INFINITY;
         }
-        products
-            .into_iter()
-            .fold(0.0, |m, e| if e > m || e.is_nan() { e } else { m })
+        products.into_iter().fold(0.0, |m, e| if e > m || e.is_nan() { e } else { m })
     }
 }
 
@@ -301,10 +272,7 @@ pub struct Pose<T> {
 impl<T: Real> Pose<T> {
     #[inline(always)]
     pub fn lift(p: &Pose<f64>) -> Self {
-        Pose {
-            rotation: Mat3::lift(p.rotation),
-            o: Vec3::lift(p.o),
-        }
+        Pose { rotation: Mat3::lift(p.rotation), o: Vec3::lift(p.o) }
     }
 }
 

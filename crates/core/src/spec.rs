@@ -15,10 +15,7 @@ pub struct Fault {
 
 impl Fault {
     pub fn new(place: impl Into<String>, message: impl Into<String>) -> Self {
-        Fault {
-            place: place.into(),
-            message: message.into(),
-        }
+        Fault { place: place.into(), message: message.into() }
     }
 }
 
@@ -167,17 +164,12 @@ impl Spec {
         }
         faults.finite3("dynamics.gravity", self.gravity);
         if !(self.efficiency > 0.0 && self.efficiency <= 1.0) {
-            faults.add(
-                "dynamics.efficiency",
-                format!("is {}; must be above 0 and at most 1", self.efficiency),
-            );
+            faults
+                .add("dynamics.efficiency", format!("is {}; must be above 0 and at most 1", self.efficiency));
         }
         for (place, mu) in [("linear", self.linear_damping), ("angular", self.angular_damping)] {
             if !(mu >= 0.0 && mu.is_finite()) {
-                faults.add(
-                    format!("dynamics.{place}_damping"),
-                    format!("is {mu}; must be zero or positive"),
-                );
+                faults.add(format!("dynamics.{place}_damping"), format!("is {mu}; must be zero or positive"));
             }
         }
         faults.finite3("load.force", self.load.force);
@@ -218,10 +210,7 @@ impl Faults {
     fn finite3(&mut self, place: &str, a: Vec3<f64>) -> bool {
         let finite = a.array().iter().all(|c| c.is_finite());
         if !finite {
-            self.add(
-                place,
-                format!("is {:?}; each component must be a finite number", a.array()),
-            );
+            self.add(place, format!("is {:?}; each component must be a finite number", a.array()));
         }
         finite
     }
@@ -250,10 +239,7 @@ impl Faults {
         if let Some(radius) = leg.radius
             && !(radius > 0.0 && radius.is_finite())
         {
-            self.add(
-                format!("{place}.radius"),
-                format!("is {radius} m; must be positive"),
-            );
+            self.add(format!("{place}.radius"), format!("is {radius} m; must be positive"));
         }
         self.body(&format!("{place}.cylinder"), leg.cylinder.as_ref());
         self.body(&format!("{place}.piston"), leg.piston.as_ref());
@@ -282,10 +268,9 @@ impl Faults {
             (JointKind::Universal, _) | (JointKind::Revolute, None) => (true, false),
             (JointKind::Fixed, _) => (true, true),
         };
-        for (key, needed, given) in [
-            ("axis", axis, joint.axis.is_some()),
-            ("normal", normal, joint.normal.is_some()),
-        ] {
+        for (key, needed, given) in
+            [("axis", axis, joint.axis.is_some()), ("normal", normal, joint.normal.is_some())]
+        {
             if needed && !given {
                 self.add(
                     format!("{place}.{key}"),
@@ -328,10 +313,7 @@ impl Faults {
         if !(body.mass > 0.0 && body.mass.is_finite()) {
             self.add(
                 format!("{place}.mass"),
-                format!(
-                    "is {} kg; must be positive (leave the body out to have none)",
-                    body.mass
-                ),
+                format!("is {} kg; must be positive (leave the body out to have none)", body.mass),
             );
         }
         if let Some(message) = inertia_fault(&body.inertia) {
@@ -343,10 +325,7 @@ impl Faults {
         let mut seen = Vec::new();
         for name in names {
             if seen.contains(&name) {
-                self.add(
-                    place,
-                    format!("the name \"{name}\" stands twice; each needs its own"),
-                );
+                self.add(place, format!("the name \"{name}\" stands twice; each needs its own"));
             }
             seen.push(name);
         }
@@ -362,15 +341,7 @@ const INERTIA_TOLERANCE: f64 = 1e-9;
 fn symmetric_about_leg(body: &BodySpec) -> bool {
     let i = &body.inertia;
     let slack = INERTIA_TOLERANCE * (i[0][0] + i[1][1] + i[2][2]);
-    let off = [
-        i[0][1],
-        i[0][2],
-        i[1][2],
-        i[1][0],
-        i[2][0],
-        i[2][1],
-        i[0][0] - i[2][2],
-    ];
+    let off = [i[0][1], i[0][2], i[1][2], i[1][0], i[2][0], i[2][1], i[0][0] - i[2][2]];
     body.center.x == 0.0 && body.center.z == 0.0 && off.iter().all(|e| e.abs() <= slack)
 }
 
@@ -388,20 +359,12 @@ fn inertia_fault(rows: &[[f64; 3]; 3]) -> Option<String> {
     if skew {
         return Some("is not symmetric; the inertia matrix equals its transpose".into());
     }
-    let mut principal: Vec<f64> = nalgebra::Matrix3::from_fn(|i, j| rows[i][j])
-        .symmetric_eigenvalues()
-        .iter()
-        .copied()
-        .collect();
+    let mut principal: Vec<f64> =
+        nalgebra::Matrix3::from_fn(|i, j| rows[i][j]).symmetric_eigenvalues().iter().copied().collect();
     principal.sort_by(f64::total_cmp);
-    let shown = format!(
-        "[{:.6e}, {:.6e}, {:.6e}] kg m^2",
-        principal[0], principal[1], principal[2]
-    );
+    let shown = format!("[{:.6e}, {:.6e}, {:.6e}] kg m^2", principal[0], principal[1], principal[2]);
     if principal[0] <= 0.0 {
-        return Some(format!(
-            "is not positive definite: its principal moments are {shown}"
-        ));
+        return Some(format!("is not positive definite: its principal moments are {shown}"));
     }
     if principal[0] + principal[1] < principal[2] * (1.0 - INERTIA_TOLERANCE) {
         return Some(format!(

@@ -20,10 +20,12 @@ pub enum Status {
     OffConstraint = 6,
     /// Not a number, infinite, or not a pose.
     InvalidInput = 7,
+    /// The dependent coordinates came out on another branch than those of the state before.
+    BranchJump = 8,
 }
 
 impl Status {
-    pub const ALL: [Status; 8] = [
+    pub const ALL: [Status; 9] = [
         Status::Ok,
         Status::NoBranch,
         Status::Fold,
@@ -32,6 +34,7 @@ impl Status {
         Status::OutOfStroke,
         Status::OffConstraint,
         Status::InvalidInput,
+        Status::BranchJump,
     ];
 
     /// What it means and what helps.
@@ -58,6 +61,10 @@ impl Status {
             }
             Status::OffConstraint => {
                 "the pose, twist or acceleration breaks a constraint of the mechanism; make it with mech.state(...)"
+            }
+            Status::BranchJump => {
+                "between the state before and this one the dependent coordinates passed a fold and came out on \
+                 another branch; take smaller steps, or coordinates without this fold"
             }
             Status::InvalidInput => {
                 "the input holds NaN or infinity, or its rotation is not a rotation matrix"

@@ -38,11 +38,7 @@ fn every_leg_of_the_catalogue_has_the_freedoms_of_its_joints() {
             let leg = &mech.legs[0];
             let joints = leg.base.kind.freedoms() + 1 + leg.platform.kind.freedoms();
             assert_eq!(mech.dof(), joints.min(6), "{letters}");
-            assert_eq!(
-                mech.constraints.len(),
-                6 - joints.min(6),
-                "{letters} has a constraint too many"
-            );
+            assert_eq!(mech.constraints.len(), 6 - joints.min(6), "{letters} has a constraint too many");
             assert_eq!(
                 (mech.mobility.redundant, mech.mobility.passive),
                 (0, joints.saturating_sub(6)),
@@ -67,12 +63,7 @@ fn leg_motion_is_the_derivative_of_leg_position() {
                 close(m.delta_rate, d1, EXACT, "δ'");
                 close(m.delta_acceleration, d2, EXACT, "δ''");
                 let scalars = Vec3::new(m.rate, m.acceleration, 0.0);
-                close(
-                    scalars,
-                    Vec3::new(jet.length.d, jet.length.dd, 0.0),
-                    EXACT,
-                    "ℓ', ℓ''",
-                );
+                close(scalars, Vec3::new(jet.length.d, jet.length.dd, 0.0), EXACT, "ℓ', ℓ''");
             }
         }
     }
@@ -83,11 +74,7 @@ fn leg_turning_is_the_derivative_of_the_leg_frame() {
     for mech in mechanisms() {
         for state in samples(&mech) {
             let moving = moving(&state);
-            for (leg, name) in mech
-                .legs
-                .iter()
-                .map(|l| (l, format!("{} {}", mech.name, l.letters())))
-            {
+            for (leg, name) in mech.legs.iter().map(|l| (l, format!("{} {}", mech.name, l.letters()))) {
                 if leg.letters() == "SPS" {
                     continue; // its frame is arbitrary
                 }
@@ -123,10 +110,9 @@ fn links_move_as_their_mass_centres_do() {
                 let turn = leg::turn(leg, &state.pose, &p, &m, &f, &state.twist, &state.acceleration);
                 let piston = parts(pj.r + fj.axes * Vec3::lift(leg.piston.center));
                 let cylinder = parts(fj.axes * Vec3::lift(leg.cylinder.center));
-                for (found, exact) in [
-                    (leg::piston(leg, &m, &f, &turn), piston),
-                    (leg::cylinder(leg, &f, &turn), cylinder),
-                ] {
+                for (found, exact) in
+                    [(leg::piston(leg, &m, &f, &turn), piston), (leg::cylinder(leg, &f, &turn), cylinder)]
+                {
                     close(found.velocity, exact[1], EXACT, "velocity");
                     close(found.acceleration, exact[2], 10.0 * EXACT, "acceleration");
                 }
@@ -171,34 +157,20 @@ fn rows_and_hessians_are_the_derivatives_of_values() {
             let v = state.twist.array();
             let total = |row: Wrench<f64>, h: &constraint::Hessian<f64>| {
                 let a = Twist::new(state.acceleration.a, state.acceleration.eps);
-                Vec3::new(
-                    row.power(&state.twist),
-                    row.power(&a) + jacobian::quadratic(h, &v),
-                    0.0,
-                )
+                Vec3::new(row.power(&state.twist), row.power(&a) + jacobian::quadratic(h, &v), 0.0)
             };
             for c in &mech.constraints {
                 let g = constraint::value(c, &jet);
                 let h = constraint::hessian(c, &state.pose);
                 let found = total(constraint::row(c, &state.pose), &h);
-                close(
-                    found,
-                    Vec3::new(g.d, g.dd, 0.0),
-                    EXACT,
-                    &format!("{} kind {:?}", mech.name, c.kind),
-                );
+                close(found, Vec3::new(g.d, g.dd, 0.0), EXACT, &format!("{} kind {:?}", mech.name, c.kind));
                 symmetric(&h);
             }
             for leg in &mech.legs {
                 let length = leg::position(leg, &jet).length;
                 let p = leg::position(leg, &state.pose);
                 let h = leg::hessian(&p);
-                close(
-                    total(leg::row(&p), &h),
-                    Vec3::new(length.d, length.dd, 0.0),
-                    EXACT,
-                    "length",
-                );
+                close(total(leg::row(&p), &h), Vec3::new(length.d, length.dd, 0.0), EXACT, "length");
                 symmetric(&h);
             }
         }
@@ -254,21 +226,10 @@ fn power_balances() {
             let damping = -(mech.linear_damping * state.twist.v.dot(state.twist.v)
                 + mech.angular_damping * state.twist.omega.dot(state.twist.omega));
             let friction = (1.0 / mech.efficiency - 1.0) * own.power(&state.twist);
-            let terms = [
-                actuators,
-                load.power(&state.twist),
-                damping,
-                friction,
-                -kinetic,
-                -potential,
-            ];
+            let terms = [actuators, load.power(&state.twist), damping, friction, -kinetic, -potential];
             let scale = terms.iter().fold(0.0_f64, |m, t| m.max(t.abs()));
             let residual: f64 = terms.iter().sum();
-            assert!(
-                residual.abs() <= 1e-10 * scale,
-                "{}: {residual:e} of {scale:e}",
-                mech.name
-            );
+            assert!(residual.abs() <= 1e-10 * scale, "{}: {residual:e} of {scale:e}", mech.name);
         }
     }
 }
@@ -309,11 +270,7 @@ fn the_same_source_serves_every_number() {
             assert_eq!(plain, forces::<Dual<f64>>(&mech, &state), "{}: dual", mech.name);
             let scale = plain.iter().fold(0.0_f64, |m, f| m.max(f.abs()));
             for (a, b) in plain.iter().zip(forces::<F<true>>(&mech, &state)) {
-                assert!(
-                    (a - b).abs() <= 1e-8 * scale,
-                    "{}: fused {b} against {a}",
-                    mech.name
-                );
+                assert!((a - b).abs() <= 1e-8 * scale, "{}: fused {b} against {a}", mech.name);
             }
         }
     }
@@ -336,24 +293,16 @@ fn duals_differentiate_the_inverse_dynamics() {
             Vec3::new(seed(v.x, 1.0), seed(v.y, 0.0), seed(v.z, 0.0)),
             Vec3::new(seed(w.x, 0.0), seed(w.y, 0.0), seed(w.z, -2.0)),
         );
-        let acceleration = Acceleration::new(
-            Vec3::lift(state.acceleration.a),
-            Vec3::lift(state.acceleration.eps),
-        );
-        let load = Wrench::new(
-            Vec3::lift(mech.load.wrench.force),
-            Vec3::lift(mech.load.wrench.torque),
-        );
+        let acceleration =
+            Acceleration::new(Vec3::lift(state.acceleration.a), Vec3::lift(state.acceleration.eps));
+        let load = Wrench::new(Vec3::lift(mech.load.wrench.force), Vec3::lift(mech.load.wrench.torque));
         let (exact, _) =
             dynamics::inverse_dynamics(&mech, &Pose::lift(&state.pose), &twist, &acceleration, load);
         // Forces are quadratic in the twist: central differences are exact up to rounding.
         let (above, below) = (at(0.5), at(-0.5));
         let scale = exact.iter().fold(0.0_f64, |m, f| m.max(f.d.abs()));
         for k in 0..6 {
-            assert!(
-                (above[k] - below[k] - exact[k].d).abs() <= 1e-9 * scale,
-                "force {k}"
-            );
+            assert!((above[k] - below[k] - exact[k].d).abs() <= 1e-9 * scale, "force {k}");
         }
     }
 }
@@ -365,11 +314,7 @@ fn acceleration_from_the_legs_is_the_acceleration_of_the_platform() {
             let motions: Vec<_> = mech
                 .actuated()
                 .map(|(_, leg)| {
-                    leg::motion(
-                        &leg::position(leg, &state.pose),
-                        &state.twist,
-                        &state.acceleration,
-                    )
+                    leg::motion(&leg::position(leg, &state.pose), &state.twist, &state.acceleration)
                 })
                 .collect();
             let rates: Vec<f64> = motions.iter().map(|m| m.rate).collect();

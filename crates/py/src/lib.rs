@@ -24,16 +24,11 @@ type Array<'py> = PyReadonlyArray1<'py, f64>;
 
 /// The one place where errors of the core become errors of Python.
 fn raise(faults: Vec<Fault>) -> PyErr {
-    Faults::new_err((faults
-        .into_iter()
-        .map(|f| (f.place, f.message))
-        .collect::<Vec<_>>(),))
+    Faults::new_err((faults.into_iter().map(|f| (f.place, f.message)).collect::<Vec<_>>(),))
 }
 
 fn slice<'a>(array: &'a Array<'_>) -> PyResult<&'a [f64]> {
-    array
-        .as_slice()
-        .map_err(|_| PyValueError::new_err("needs a contiguous array"))
+    array.as_slice().map_err(|_| PyValueError::new_err("needs a contiguous array"))
 }
 
 /// `len(poses) / 16` states; every other array must fit them.
@@ -65,9 +60,7 @@ struct PyMechanism(Mechanism);
 impl PyMechanism {
     fn set(&self, name: &str) -> PyResult<Set> {
         let sets = Set::of(&self.0);
-        sets.into_iter()
-            .find(|s| s.name() == name)
-            .ok_or_else(|| PyKeyError::new_err(name.to_owned()))
+        sets.into_iter().find(|s| s.name() == name).ok_or_else(|| PyKeyError::new_err(name.to_owned()))
     }
 }
 
@@ -86,9 +79,7 @@ fn loads<'a>(wrench: Option<&'a Array<'_>>, platform_axes: bool, poses: &[f64]) 
 impl PyMechanism {
     #[new]
     fn new(spec: &str) -> PyResult<Self> {
-        Mechanism::new(&Spec::from_json(spec).map_err(raise)?)
-            .map(PyMechanism)
-            .map_err(raise)
+        Mechanism::new(&Spec::from_json(spec).map_err(raise)?).map(PyMechanism).map_err(raise)
     }
 
     #[getter]
@@ -115,19 +106,12 @@ impl PyMechanism {
     /// Letters of each leg's joints from base to platform.
     #[getter]
     fn leg_letters(&self) -> Vec<String> {
-        self.0
-            .legs
-            .iter()
-            .map(polypod_core::mechanism::Leg::letters)
-            .collect()
+        self.0.legs.iter().map(polypod_core::mechanism::Leg::letters).collect()
     }
 
     /// Name, all numbers, and whether each must be given (none for a set where any will do).
     fn coordinate_sets(&self) -> Vec<CoordinateSet> {
-        Set::of(&self.0)
-            .iter()
-            .map(|s| (s.name(), s.names().to_vec(), s.given(&self.0)))
-            .collect()
+        Set::of(&self.0).iter().map(|s| (s.name(), s.names().to_vec(), s.given(&self.0))).collect()
     }
 
     /// The mobility analysis as JSON.
@@ -149,9 +133,7 @@ impl PyMechanism {
     ) -> PyResult<Bound<'py, PyDict>> {
         let set = self.set(set)?;
         if given.len() != set.names().len() {
-            return Err(PyValueError::new_err(
-                "needs one entry for each number of the set",
-            ));
+            return Err(PyValueError::new_err("needs one entry for each number of the set"));
         }
         let mut series = Vec::with_capacity(given.len());
         for entry in &given {
@@ -172,13 +154,7 @@ impl PyMechanism {
         if guess.is_some_and(|g| g.len() != 16 && g.len() != 16 * count) {
             return Err(PyValueError::new_err("needs one guess, or one for each state"));
         }
-        let input = Coordinates {
-            set,
-            given: series,
-            branch,
-            guess,
-            continued,
-        };
+        let input = Coordinates { set, given: series, branch, guess, continued };
         let table = py.detach(|| batch::states(&self.0, &input, count));
         arrays(py, table)
     }
@@ -299,9 +275,7 @@ impl PyMechanism {
         let (poses, multipliers) = (slice(&poses)?, slice(&multipliers)?);
         expect(multipliers, 6 - self.0.dof(), poses)?;
         let result = py.detach(|| batch::coupled_forces(&self.0, poses, multipliers, as_printed));
-        result
-            .map(|(pair, table)| Ok((pair, arrays(py, table)?)))
-            .transpose()
+        result.map(|(pair, table)| Ok((pair, arrays(py, table)?))).transpose()
     }
 }
 
@@ -313,20 +287,13 @@ fn states<'a>(
     let (poses, twists, accelerations) = (slice(poses)?, slice(twists)?, slice(accelerations)?);
     expect(twists, 6, poses)?;
     expect(accelerations, 6, poses)?;
-    Ok(States {
-        poses,
-        twists,
-        accelerations,
-    })
+    Ok(States { poses, twists, accelerations })
 }
 
 /// Code and message of every status.
 #[pyfunction]
 fn statuses() -> Vec<(u8, String, &'static str)> {
-    Status::ALL
-        .iter()
-        .map(|&s| (s as u8, format!("{s:?}"), s.message()))
-        .collect()
+    Status::ALL.iter().map(|&s| (s as u8, format!("{s:?}"), s.message())).collect()
 }
 
 #[pymodule]

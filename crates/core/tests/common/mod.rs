@@ -34,10 +34,7 @@ impl Draw {
 /// Every pair of joints.
 pub fn every_leg() -> Vec<String> {
     let letters = ["S", "U", "R", "F"];
-    letters
-        .iter()
-        .flat_map(|base| letters.iter().map(move |platform| format!("{base}P{platform}")))
-        .collect()
+    letters.iter().flat_map(|base| letters.iter().map(move |platform| format!("{base}P{platform}"))).collect()
 }
 
 fn body(draw: &mut Draw, symmetric: bool) -> serde_json::Value {
@@ -52,11 +49,7 @@ fn body(draw: &mut Draw, symmetric: bool) -> serde_json::Value {
             }
         }
     }
-    let center = if symmetric {
-        [0.0, 0.1, 0.0]
-    } else {
-        (draw.vector() * 0.1).array()
-    };
+    let center = if symmetric { [0.0, 0.1, 0.0] } else { (draw.vector() * 0.1).array() };
     if symmetric {
         let (across, along) = (inertia[0][0] + inertia[2][2], inertia[0][0]);
         inertia = [[across, 0.0, 0.0], [0.0, along, 0.0], [0.0, 0.0, across]];
@@ -188,9 +181,7 @@ pub fn states(mech: &Mechanism, count: usize, seed: u64) -> Vec<State> {
         let at = Set::Pose.values(mech, &pose);
         let motion: [(f64, f64); 6] = std::array::from_fn(|_| (draw.number(), draw.number()));
         for mask in 0..64_u32 {
-            let given: Vec<bool> = (0..MAX_COORDINATES)
-                .map(|k| k >= 6 || mask & (1 << k) != 0)
-                .collect();
+            let given: Vec<bool> = (0..MAX_COORDINATES).map(|k| k >= 6 || mask & (1 << k) != 0).collect();
             if mask.count_ones() as usize != mech.dof() {
                 continue;
             }
@@ -224,11 +215,7 @@ pub fn moving(state: &State) -> Pose<Jet<f64>> {
 }
 
 pub fn jets(x: Vec3<f64>, d: Vec3<f64>, dd: Vec3<f64>) -> Vec3<Jet<f64>> {
-    Vec3::new(
-        Jet::new(x.x, d.x, dd.x),
-        Jet::new(x.y, d.y, dd.y),
-        Jet::new(x.z, d.z, dd.z),
-    )
+    Vec3::new(Jet::new(x.x, d.x, dd.x), Jet::new(x.y, d.y, dd.y), Jet::new(x.z, d.z, dd.z))
 }
 
 /// The parts of a vector of jets.
@@ -239,8 +226,5 @@ pub fn parts(a: Vec3<Jet<f64>>) -> [Vec3<f64>; 3] {
 /// Asserts that two vectors are equal to `tolerance`, relative to the larger of them and one.
 pub fn close(found: Vec3<f64>, expected: Vec3<f64>, tolerance: f64, what: &str) {
     let error = (found - expected).norm() / expected.norm().max(1.0);
-    assert!(
-        error <= tolerance,
-        "{what}: {found:?} is not {expected:?}, off by {error:e}"
-    );
+    assert!(error <= tolerance, "{what}: {found:?} is not {expected:?}, off by {error:e}");
 }
