@@ -6,21 +6,20 @@ mod common;
 use std::hint::black_box;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
-use polypod_core::coordinates::State;
 use polypod_core::real::{Dual, Real};
-use polypod_core::spatial::{Acceleration, Pose, Twist, Vec3, Wrench};
+use polypod_core::spatial::{Acceleration, Motion, Pose, Twist, Vec3, Wrench};
 use polypod_core::{dynamics, jacobian, leg};
 
 /// Different states in turn, so that nothing is learnt from the last one.
 const STATES: usize = 64;
 
-fn lifted<T: Real>(state: &State) -> (Pose<T>, Twist<T>, Acceleration<T>) {
+fn lifted<T: Real>(state: &Motion<f64>) -> Motion<T> {
     let lift = Vec3::<T>::lift;
-    (
-        Pose::lift(&state.pose),
-        Twist::new(lift(state.twist.v), lift(state.twist.omega)),
-        Acceleration::new(lift(state.acceleration.a), lift(state.acceleration.eps)),
-    )
+    Motion {
+        pose: Pose::lift(&state.pose),
+        twist: Twist::new(lift(state.twist.v), lift(state.twist.omega)),
+        acceleration: Acceleration::new(lift(state.acceleration.a), lift(state.acceleration.eps)),
+    }
 }
 
 fn kernels(criterion: &mut Criterion) {
@@ -28,7 +27,7 @@ fn kernels(criterion: &mut Criterion) {
     let states = common::states(&mech, STATES, 1);
     let mut group = criterion.benchmark_group("one state, scalar");
     group.throughput(Throughput::Elements(1));
-    let mut measure = |name: &str, run: &dyn Fn(&State)| {
+    let mut measure = |name: &str, run: &dyn Fn(&Motion<f64>)| {
         let mut next = (0..STATES).cycle();
         group.bench_function(name, |b| {
             b.iter(|| run(black_box(&states[next.next().unwrap_or(0)])));
@@ -46,12 +45,12 @@ fn kernels(criterion: &mut Criterion) {
         black_box(jacobian::hessian(&mech, &s.pose));
     });
     measure("inverse dynamics", &|s| {
-        black_box(dynamics::inverse_dynamics(&mech, &s.pose, &s.twist, &s.acceleration, mech.load.wrench));
+        black_box(dynamics::inverse_dynamics(&mech, s, mech.load.wrench));
     });
     measure("inverse dynamics and one derivative", &|s| {
-        let (pose, twist, acceleration) = lifted::<Dual<f64>>(s);
+        let platform = lifted::<Dual<f64>>(s);
         let load = Wrench::new(Vec3::lift(mech.load.wrench.force), Vec3::lift(mech.load.wrench.torque));
-        black_box(dynamics::inverse_dynamics(&mech, &pose, &twist, &acceleration, load));
+        black_box(dynamics::inverse_dynamics(&mech, &platform, load));
     });
     group.finish();
 }

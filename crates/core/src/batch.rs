@@ -10,7 +10,7 @@ use crate::mechanism::Mechanism;
 use crate::mobility;
 use crate::real::{Dual, Jet};
 use crate::singularity;
-use crate::spatial::{Acceleration, Mat3, Pose, Twist, Vec3, Wrench};
+use crate::spatial::{Acceleration, Mat3, Motion, Pose, Twist, Vec3, Wrench};
 use crate::spec::Axes;
 use crate::status::Status;
 
@@ -72,13 +72,13 @@ impl States<'_> {
     }
 
     /// The state, and whether it is one that the mechanism can be in.
-    fn read(&self, mech: &Mechanism, i: usize) -> (Pose<f64>, Twist<f64>, Acceleration<f64>, Status) {
+    fn read(&self, mech: &Mechanism, i: usize) -> (Motion<f64>, Status) {
         let (pose, status) = read_pose(mech, self.poses, i);
         let twist = Twist::from_array(six(self.twists, i));
         let acceleration = Acceleration::from_array(six(self.accelerations, i));
         let status = then(status, || check_twist(mech, &pose, &twist));
         let status = then(status, || check_acceleration(mech, &pose, &twist, &acceleration));
-        (pose, twist, acceleration, status)
+        (Motion { pose, twist, acceleration }, status)
     }
 }
 
@@ -263,23 +263,20 @@ pub fn kinematics(mech: &Mechanism, states: &States) -> Table {
     );
     let zeros: Vec<Zero> = mech.legs.iter().map(|leg| Zero::of(leg, &mech.home)).collect();
     for i in 0..n {
-        let (pose, twist, acceleration, status) = states.read(mech, i);
-        table.status[i] = status;
+        let (platform, status) = states.read(mech, i);
+        table.status[i] = then(status, || stroke_status(mech, &platform.pose));
         if status != Status::Ok {
             continue;
         }
-        table.status[i] = stroke_status(mech, &pose);
         for (k, leg) in mech.legs.iter().enumerate() {
-            let p = leg::position(leg, &pose);
-            let m = leg::motion(&p, &twist, &acceleration);
-            let f = leg::frame(leg, &pose, &p);
-            let turn = leg::turn(leg, &pose, &p, &m, &f, &twist, &acceleration);
-            let (piston, cylinder) = (leg::piston(leg, &m, &f, &turn), leg::cylinder(leg, &f, &turn));
-            let [below, above] = joints::angles(leg, &zeros[k], &pose, &twist, &p, &f, &turn);
+            let state = leg::state(leg, &platform);
+            let leg::State { position: p, end, turn, frame } = &state;
+            let (piston, cylinder) = (leg::piston(leg, &state), leg::cylinder(leg, &state));
+            let [below, above] = joints::angles(leg, &zeros[k], &platform, &state);
             let values: [&[f64]; 18] = [
                 &[p.length],
-                &[m.rate],
-                &[m.acceleration],
+                &[end.rate],
+                &[end.acceleration],
                 &p.delta.array(),
                 &turn.omega.array(),
                 &turn.eps.array(),
@@ -300,8 +297,8 @@ pub fn kinematics(mech: &Mechanism, states: &States) -> Table {
                 table.set(*id, i, k, value);
             }
             for (r, rod) in mech.rods.iter().enumerate().filter(|(_, rod)| rod.leader == k) {
-                let rod_turn = leg::rod_turn(rod.axis, &m, &f, &turn);
-                table.set(ids[18], i, r, &[joints::rod_angle(mech, r, &zeros[k], &f)]);
+                let rod_turn = leg::rod_turn(rod.axis, &state);
+                table.set(ids[18], i, r, &[joints::rod_angle(mech, r, &zeros[k], frame)]);
                 table.set(ids[19], i, r, &(rod.axis * rod_turn.rate).array());
                 table.set(ids[20], i, r, &(rod.axis * rod_turn.acceleration).array());
             }
@@ -335,14 +332,14 @@ pub fn inverse_dynamics(mech: &Mechanism, states: &States, loads: &Loads) -> Tab
     let (mut table, [forces, multipliers]) =
         Table::new(n, [("forces", vec![mech.legs.len()]), ("constraint", vec![mech.independent.len()])]);
     for i in 0..n {
-        let (pose, twist, acceleration, status) = states.read(mech, i);
-        let load = loads.at(mech, &pose, i);
+        let (platform, status) = states.read(mech, i);
+        let load = loads.at(mech, &platform.pose, i);
         let mut status = then(status, || check_finite(&load.array()));
         if status == Status::Ok {
-            let (f, pivots) = dynamics::inverse_dynamics(mech, &pose, &twist, &acceleration, load);
+            let (f, pivots) = dynamics::inverse_dynamics(mech, &platform, load);
             status = outcome(&f, pivots);
             if status == Status::Ok {
-                status = stroke_status(mech, &pose);
+                status = stroke_status(mech, &platform.pose);
                 put_forces(mech, &mut table, forces, i, &f);
                 table.set(multipliers, i, 0, &f[mech.dof()..]);
             }
@@ -469,65 +466,44 @@ pub fn power(mech: &Mechanism, states: &States, loads: &Loads) -> Table {
     ];
     let (mut table, ids) = Table::new(n, names.map(|name| (name, vec![])));
     for i in 0..n {
-        let (pose, twist, acceleration, status) = states.read(mech, i);
-        let load_wrench = loads.at(mech, &pose, i);
-        table.status[i] = then(status, || check_finite(&load_wrench.array()));
+        let (platform, status) = states.read(mech, i);
+        let Motion { pose, twist, .. } = &platform;
+        let wrench = loads.at(mech, pose, i);
+        table.status[i] = then(status, || check_finite(&wrench.array()));
         if table.status[i] != Status::Ok {
             continue;
         }
-        table.status[i] = stroke_status(mech, &pose);
-        let (kinetic, potential) = energy_along(mech, &pose, &twist, &acceleration);
-        let load = load_wrench.power(&twist);
+        let (kinetic, potential) = energy_along(mech, &platform);
+        let load = wrench.power(twist);
         let damping = -(mech.linear_damping * twist.v.dot(twist.v)
             + mech.angular_damping * twist.omega.dot(twist.omega));
-        let (f, pivots) = dynamics::inverse_dynamics(mech, &pose, &twist, &acceleration, load_wrench);
-        let singular = outcome(&f, pivots) != Status::Ok;
-        let rates = mech
-            .actuated()
-            .map(|(_, leg)| leg::motion(&leg::position(leg, &pose), &twist, &acceleration).rate);
+        let (f, pivots) = dynamics::inverse_dynamics(mech, &platform, wrench);
+        let rates = mech.actuated().map(|(_, leg)| leg::row(&leg::position(leg, pose)).power(twist));
+        table.status[i] = then(outcome(&f, pivots), || stroke_status(mech, pose));
+        let singular = table.status[i] == Status::Singular;
         let actuators = if singular { f64::NAN } else { rates.zip(&f).map(|(rate, f)| rate * f).sum() };
-        // What the efficiency takes: actuators serve the platform's term 1/η times.
-        let without_legs = platform_power(mech, &pose, &twist, &acceleration, load_wrench);
-        let friction = (1.0 / mech.efficiency - 1.0) * without_legs;
+        // What the efficiency takes: actuators serve the platform's term of [Eq. 42] 1/η times.
+        let own = (wrench + dynamics::platform_wrench(mech, &platform)).power(twist);
+        let friction = (1.0 / mech.efficiency - 1.0) * own;
         let residual = actuators + load + damping + friction - kinetic.d - potential.d;
         let values =
             [kinetic.x, potential.x, kinetic.d, potential.d, actuators, load, damping, friction, residual];
         for (id, value) in ids.iter().zip(values) {
             table.set(*id, i, 0, &[value]);
         }
-        if singular {
-            table.status[i] = Status::Singular;
-        }
     }
     table
 }
 
-/// Power of the platform's term of [Eq. 42], which the efficiency divides.
-fn platform_power(
-    mech: &Mechanism,
-    pose: &Pose<f64>,
-    twist: &Twist<f64>,
-    acceleration: &Acceleration<f64>,
-    load: Wrench<f64>,
-) -> f64 {
-    (load + dynamics::platform_wrench(mech, pose, twist, acceleration)).power(twist)
-}
-
 /// Kinetic and potential energy as duals along the motion.
-fn energy_along(
-    mech: &Mechanism,
-    pose: &Pose<f64>,
-    twist: &Twist<f64>,
-    acceleration: &Acceleration<f64>,
-) -> (Dual<f64>, Dual<f64>) {
-    let pair =
+fn energy_along(mech: &Mechanism, platform: &Motion<f64>) -> (Dual<f64>, Dual<f64>) {
+    let Motion { pose, twist, acceleration } = platform;
+    let dual =
         |x: Vec3<f64>, d: Vec3<f64>| Vec3::new(Dual::new(x.x, d.x), Dual::new(x.y, d.y), Dual::new(x.z, d.z));
-    let moving_pose = Pose {
-        rotation: Mat3(pose.rotation.0.map(|c| pair(c, twist.omega.cross(c)))),
-        o: pair(pose.o, twist.v),
-    };
-    let moving_twist = Twist::new(pair(twist.v, acceleration.a), pair(twist.omega, acceleration.eps));
-    dynamics::energy(mech, &moving_pose, &moving_twist)
+    let rotation = Mat3(pose.rotation.0.map(|c| dual(c, twist.omega.cross(c))));
+    let moving = Pose { rotation, o: dual(pose.o, twist.v) };
+    let twist = Twist::new(dual(twist.v, acceleration.a), dual(twist.omega, acceleration.eps));
+    dynamics::energy(mech, &moving, &twist)
 }
 
 /// Singular values of the leg Jacobian on the twists that the constraints allow \[T24\].
@@ -597,17 +573,17 @@ pub fn states(mech: &Mechanism, input: &Coordinates, n: usize) -> Table {
         let solved = matches!(table.status[i], Status::Ok | Status::Fold);
         if solved {
             if state.status == Status::Ok {
-                (last, branch) = (state.pose, state.branch);
+                (last, branch) = (state.platform.pose, state.branch);
             }
-            let (r, o) = (state.pose.rotation.rows(), state.pose.o.array());
+            let (r, o) = (state.platform.pose.rotation.rows(), state.platform.pose.o.array());
             for k in 0..3 {
                 table.set(poses, i, k, &[r[k][0], r[k][1], r[k][2], o[k]]);
             }
             table.set(poses, i, 3, &[0.0, 0.0, 0.0, 1.0]);
         }
         if table.status[i] == Status::Ok {
-            table.set(twists, i, 0, &state.twist.array());
-            table.set(accelerations, i, 0, &state.acceleration.array());
+            table.set(twists, i, 0, &state.platform.twist.array());
+            table.set(accelerations, i, 0, &state.platform.acceleration.array());
         }
         for k in 0..names.len() {
             if solved || mask[k] {

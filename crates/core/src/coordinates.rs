@@ -9,7 +9,7 @@ use crate::linear::{Solved, solve};
 use crate::mechanism::{MAX_CONSTRAINTS, Mechanism};
 use crate::mobility::count;
 use crate::real::{Dual, Jet, Real, Trig};
-use crate::spatial::{Acceleration, Mat3, Pose, Twist, Vec3};
+use crate::spatial::{Acceleration, Mat3, Motion, Pose, Twist, Vec3};
 use crate::status::Status;
 
 /// Most numbers of any set.
@@ -280,9 +280,7 @@ fn turn_about<T: Trig>(axis: Vec3<f64>, angle: T) -> Mat3<T> {
 #[derive(Clone, Copy, Debug)]
 pub struct State {
     pub coordinates: Values<Jet<f64>>,
-    pub pose: Pose<f64>,
-    pub twist: Twist<f64>,
-    pub acceleration: Acceleration<f64>,
+    pub platform: Motion<f64>,
     /// Which of several solutions the dependent coordinates are: the sign of sin γ, or of det ∂g/∂y \[T23\].
     pub branch: f64,
     pub status: Status,
@@ -313,18 +311,16 @@ pub fn state(
         (Status::InvalidInput, f64::NAN)
     };
     let pose = set.pose(mech, &q);
-    let mut state = State {
-        coordinates: q,
-        pose: Pose { rotation: Mat3(pose.rotation.0.map(|c| c.map(|j| j.x))), o: pose.o.map(|j| j.x) },
-        twist: Twist::new(pose.o.map(|j| j.d), half_cross(&pose.rotation, |j| j.d)),
-        acceleration: Acceleration::new(pose.o.map(|j| j.dd), half_cross(&pose.rotation, |j| j.dd)),
-        branch,
-        status,
+    let part = |a: Vec3<Jet<f64>>, of: fn(Jet<f64>) -> f64| a.map(of);
+    let (r, o) = (pose.rotation, pose.o);
+    let platform = Motion {
+        pose: Pose { rotation: Mat3(r.0.map(|c| part(c, |j| j.x))), o: part(o, |j| j.x) },
+        twist: Twist::new(part(o, |j| j.d), half_cross(&r, |j| j.d)),
+        acceleration: Acceleration::new(part(o, |j| j.dd), half_cross(&r, |j| j.dd)),
     };
-    if status == Status::Ok && state.pose.rotation.0.iter().any(|c| !c.norm().is_finite()) {
-        state.status = Status::Fold;
-    }
-    state
+    // A tool axis opposite to the one at home has no shortest turn.
+    let undefined = status == Status::Ok && r.0.iter().any(|c| !c.norm().x.is_finite());
+    State { coordinates: q, platform, branch, status: if undefined { Status::Fold } else { status } }
 }
 
 /// `½ Σ x_i × x_i'` over the columns of R is ω, `½ Σ x_i × x_i''` is ε \[T19\].

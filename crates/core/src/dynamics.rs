@@ -6,7 +6,7 @@ use crate::leg;
 use crate::linear::solve;
 use crate::mechanism::{Body, Leg, Mechanism, Rod};
 use crate::real::Real;
-use crate::spatial::{Acceleration, Mat3, Pose, Twist, Vec3, Wrench};
+use crate::spatial::{Acceleration, Mat3, Motion, Pose, Twist, Vec3, Wrench};
 use crate::spec::Axes;
 
 /// The load on the platform at o; in platform axes it turns with the platform.
@@ -35,12 +35,8 @@ fn inertial_torque<T: Real>(body: &Body, axes: Mat3<T>, omega: Vec3<T>, eps: Vec
 
 /// The platform's own term of [Eq. 42]: weight, inertia and damping, as a wrench at o.
 #[inline(always)]
-pub fn platform_wrench<T: Real>(
-    mech: &Mechanism,
-    pose: &Pose<T>,
-    twist: &Twist<T>,
-    acceleration: &Acceleration<T>,
-) -> Wrench<T> {
+pub fn platform_wrench<T: Real>(mech: &Mechanism, platform: &Motion<T>) -> Wrench<T> {
+    let Motion { pose, twist, acceleration } = platform;
     let body = &mech.platform;
     let center = pose.rotation * Vec3::lift(body.center);
     let a = acceleration.a + acceleration.eps.cross(center) + twist.omega.cross(twist.omega.cross(center));
@@ -54,30 +50,21 @@ pub fn platform_wrench<T: Real>(
 
 /// Cylinder, piston and the rods that the leg leads, carried to the platform \[T14\].
 #[inline(always)]
-fn leg_wrench<T: Real>(
-    mech: &Mechanism,
-    index: usize,
-    leg: &Leg,
-    pose: &Pose<T>,
-    twist: &Twist<T>,
-    acceleration: &Acceleration<T>,
-) -> Wrench<T> {
+fn leg_wrench<T: Real>(mech: &Mechanism, index: usize, leg: &Leg, platform: &Motion<T>) -> Wrench<T> {
     let gravity = Vec3::lift(mech.gravity);
-    let p = leg::position(leg, pose);
-    let m = leg::motion(&p, twist, acceleration);
-    let f = leg::frame(leg, pose, &p);
-    let turn = leg::turn(leg, pose, &p, &m, &f, twist, acceleration);
-
-    let (piston, cylinder) = (leg::piston(leg, &m, &f, &turn), leg::cylinder(leg, &f, &turn));
+    let state = leg::state(leg, platform);
+    let (f, turn) = (&state.frame, &state.turn);
+    let (piston, cylinder) = (leg::piston(leg, &state), leg::cylinder(leg, &state));
     let force = inertial_force(&leg.piston, gravity, piston.acceleration);
     let torque = piston.offset.cross(force)
         + cylinder.offset.cross(inertial_force(&leg.cylinder, gravity, cylinder.acceleration))
         + inertial_torque(&leg.piston, f.axes, turn.omega, turn.eps)
         + inertial_torque(&leg.cylinder, f.axes, turn.omega, turn.eps);
-    let mut wrench = leg::carry(leg, &p, &f, force, torque);
+    let mut wrench = leg::carry(leg, &state, force, torque);
     for rod in mech.rods.iter().filter(|rod| rod.leader == index) {
-        let about = rod_torque(mech, rod, &m, &f, &turn);
+        let about = rod_torque(mech, rod, &state);
         // The rod's power is its torque about L times ω_L = n·δ'/|L×δ|, with δ' = (v_b - ℓ'δ)/ℓ and n square to δ.
+        let p = &state.position;
         wrench = wrench + Wrench::at(p.e, f.n() * (about / (f.sine * p.length)));
     }
     wrench
@@ -85,17 +72,11 @@ fn leg_wrench<T: Real>(
 
 /// Torque of the rod's weight and inertia about its line, in the rod's axes (L, n, L×n) [Eq. 36, 42].
 #[inline(always)]
-fn rod_torque<T: Real>(
-    mech: &Mechanism,
-    rod: &Rod,
-    m: &leg::Motion<T>,
-    f: &leg::Frame<T>,
-    turn: &leg::Turn<T>,
-) -> T {
-    let axis = Vec3::lift(rod.axis);
-    let rod_turn = leg::rod_turn(axis, m, f, turn);
-    let (omega, eps) = (axis * rod_turn.rate, axis * rod_turn.acceleration);
-    let axes = Mat3::from_columns(axis, f.n(), axis.cross(f.n()));
+fn rod_torque<T: Real>(mech: &Mechanism, rod: &Rod, leader: &leg::State<T>) -> T {
+    let (axis, n) = (Vec3::lift(rod.axis), leader.frame.n());
+    let turn = leg::rod_turn(axis, leader);
+    let (omega, eps) = (axis * turn.rate, axis * turn.acceleration);
+    let axes = Mat3::from_columns(axis, n, axis.cross(n));
     let center = axes * Vec3::lift(rod.body.center);
     let a = eps.cross(center) + omega.cross(omega.cross(center));
     let force = inertial_force(&rod.body, Vec3::lift(mech.gravity), a);
@@ -105,17 +86,11 @@ fn rod_torque<T: Real>(
 /// All that the actuators and constraints must balance, as a wrench at o: the braces of [Eq. 43]. The paper's
 /// efficiency η divides the platform's term alone.
 #[inline(always)]
-pub fn resultant<T: Real>(
-    mech: &Mechanism,
-    pose: &Pose<T>,
-    twist: &Twist<T>,
-    acceleration: &Acceleration<T>,
-    load: Wrench<T>,
-) -> Wrench<T> {
-    let platform = load + platform_wrench(mech, pose, twist, acceleration);
-    let mut sum = platform * T::lit(1.0 / mech.efficiency);
+pub fn resultant<T: Real>(mech: &Mechanism, platform: &Motion<T>, load: Wrench<T>) -> Wrench<T> {
+    let own = load + platform_wrench(mech, platform);
+    let mut sum = own * T::lit(1.0 / mech.efficiency);
     for (i, leg) in mech.legs.iter().enumerate() {
-        sum = sum + leg_wrench(mech, i, leg, pose, twist, acceleration);
+        sum = sum + leg_wrench(mech, i, leg, platform);
     }
     sum
 }
@@ -123,16 +98,10 @@ pub fn resultant<T: Real>(
 /// Active forces along the actuated legs, then the multipliers of the independent constraints:
 /// `F_r = -J⁻ᵀ {...}` [Eq. 43], with the pivot ratio of J.
 #[inline(always)]
-pub fn inverse_dynamics<T: Real>(
-    mech: &Mechanism,
-    pose: &Pose<T>,
-    twist: &Twist<T>,
-    acceleration: &Acceleration<T>,
-    load: Wrench<T>,
-) -> ([T; 6], f64) {
-    let w = resultant(mech, pose, twist, acceleration, load);
+pub fn inverse_dynamics<T: Real>(mech: &Mechanism, platform: &Motion<T>, load: Wrench<T>) -> ([T; 6], f64) {
+    let w = resultant(mech, platform, load);
     let scaled = Wrench::new(w.force, w.torque * T::lit(1.0 / mech.characteristic_length));
-    let solved = solve(transposed(&scaled_jacobian(mech, pose)), scaled.array().map(|x| -x));
+    let solved = solve(transposed(&scaled_jacobian(mech, &platform.pose)), scaled.array().map(|x| -x));
     (solved.x, solved.pivots)
 }
 
@@ -146,7 +115,7 @@ fn transposed<T: Real>(m: &Matrix6<T>) -> Matrix6<T> {
 #[inline(always)]
 pub fn energy<T: Real>(mech: &Mechanism, pose: &Pose<T>, twist: &Twist<T>) -> (T, T) {
     let gravity = Vec3::lift(mech.gravity);
-    let rest = Acceleration::zero();
+    let platform = Motion { pose: *pose, twist: *twist, acceleration: Acceleration::zero() };
     let link = |body: &Body, axes: Mat3<T>, omega: Vec3<T>, velocity: Vec3<T>, place: Vec3<T>| {
         let (omega, mass) = (axes.transpose_mul(omega), T::lit(body.mass));
         let kinetic =
@@ -154,27 +123,20 @@ pub fn energy<T: Real>(mech: &Mechanism, pose: &Pose<T>, twist: &Twist<T>) -> (T
         (kinetic, -(gravity.dot(place) * mass))
     };
     let center = pose.rotation * Vec3::lift(mech.platform.center);
-    let mut sum = link(
-        &mech.platform,
-        pose.rotation,
-        twist.omega,
-        twist.v + twist.omega.cross(center),
-        pose.o + center,
-    );
+    let velocity = twist.v + twist.omega.cross(center);
+    let mut sum = link(&mech.platform, pose.rotation, twist.omega, velocity, pose.o + center);
     let mut add = |(kinetic, potential): (T, T)| sum = (sum.0 + kinetic, sum.1 + potential);
     for (i, leg) in mech.legs.iter().enumerate() {
-        let p = leg::position(leg, pose);
-        let m = leg::motion(&p, twist, &rest);
-        let f = leg::frame(leg, pose, &p);
-        let turn = leg::turn(leg, pose, &p, &m, &f, twist, &rest);
+        let state = leg::state(leg, &platform);
+        let (axes, omega) = (state.frame.axes, state.turn.omega);
         let base = Vec3::lift(leg.base.point);
-        let (piston, cylinder) = (leg::piston(leg, &m, &f, &turn), leg::cylinder(leg, &f, &turn));
-        add(link(&leg.piston, f.axes, turn.omega, piston.velocity, base + p.r + piston.offset));
-        add(link(&leg.cylinder, f.axes, turn.omega, cylinder.velocity, base + cylinder.offset));
+        let (piston, cylinder) = (leg::piston(leg, &state), leg::cylinder(leg, &state));
+        add(link(&leg.piston, axes, omega, piston.velocity, base + state.position.r + piston.offset));
+        add(link(&leg.cylinder, axes, omega, cylinder.velocity, base + cylinder.offset));
         for rod in mech.rods.iter().filter(|rod| rod.leader == i) {
-            let axis = Vec3::lift(rod.axis);
-            let omega = axis * leg::rod_turn(axis, &m, &f, &turn).rate;
-            let axes = Mat3::from_columns(axis, f.n(), axis.cross(f.n()));
+            let (axis, n) = (Vec3::lift(rod.axis), state.frame.n());
+            let omega = axis * leg::rod_turn(axis, &state).rate;
+            let axes = Mat3::from_columns(axis, n, axis.cross(n));
             let center = axes * Vec3::lift(rod.body.center);
             add(link(&rod.body, axes, omega, omega.cross(center), Vec3::lift(rod.point) + center));
         }

@@ -3,9 +3,9 @@
 //! At the base they are those of the leg against the base, at the platform those of the platform against the leg, so
 //! that `ω = ω_leg + φ_1' u + φ_2' n` [Eq. 29].
 
-use crate::leg::{self, Frame, Position, Turn};
+use crate::leg::{self, Frame, State};
 use crate::mechanism::{Joint, Leg, Mechanism};
-use crate::spatial::{Mat3, Pose, Twist, Vec3};
+use crate::spatial::{Mat3, Motion, Pose, Vec3};
 use crate::spec::JointKind;
 
 /// Angles and rates of one joint: U has both (about the axis in the body, then about n), R the first, others none.
@@ -36,21 +36,14 @@ impl Zero {
 
 /// Base joint and platform joint of a leg.
 #[must_use]
-pub fn angles(
-    leg: &Leg,
-    zero: &Zero,
-    pose: &Pose<f64>,
-    twist: &Twist<f64>,
-    p: &Position<f64>,
-    f: &Frame<f64>,
-    turn: &Turn<f64>,
-) -> [JointAngles; 2] {
-    let base = one(&leg.base, zero.base, &Mat3::identity(), p, f, turn.omega);
-    let mut platform = one(&leg.platform, zero.platform, &pose.rotation, p, f, turn.omega - twist.omega);
+pub fn angles(leg: &Leg, zero: &Zero, platform: &Motion<f64>, state: &State<f64>) -> [JointAngles; 2] {
+    let relative = state.turn.omega - platform.twist.omega;
+    let base = one(&leg.base, zero.base, &Mat3::identity(), state, state.turn.omega);
+    let mut above = one(&leg.platform, zero.platform, &platform.pose.rotation, state, relative);
     // Seen from the leg the platform turns the other way.
-    platform.angles = platform.angles.map(|a| -a);
-    platform.rates = platform.rates.map(|a| -a);
-    [base, platform]
+    above.angles = above.angles.map(|a| -a);
+    above.rates = above.rates.map(|a| -a);
+    [base, above]
 }
 
 /// The leg against a body with the given axes, turning at `omega` relative to it.
@@ -58,11 +51,10 @@ fn one(
     joint: &Joint,
     (n0, delta0): (Vec3<f64>, Vec3<f64>),
     body: &Mat3<f64>,
-    p: &Position<f64>,
-    f: &Frame<f64>,
+    state: &State<f64>,
     omega: Vec3<f64>,
 ) -> JointAngles {
-    let (n, delta) = (body.transpose_mul(f.n()), body.transpose_mul(p.delta));
+    let (n, delta) = (body.transpose_mul(state.frame.n()), body.transpose_mul(state.position.delta));
     let omega = body.transpose_mul(omega);
     let mut result = JointAngles {
         angles: [f64::NAN; 2],

@@ -3,7 +3,7 @@
 use crate::constraint::{Hessian, add_centripetal, turning_axis};
 use crate::mechanism::{Leg, Turning};
 use crate::real::Real;
-use crate::spatial::{Acceleration, Mat3, Pose, Twist, Vec3, Wrench};
+use crate::spatial::{Mat3, Motion, Pose, Vec3, Wrench};
 
 /// Where the leg is, base axes \[T1\].
 #[derive(Clone, Copy, Debug)]
@@ -53,7 +53,7 @@ pub fn hessian<T: Real>(p: &Position<T>) -> Hessian<T> {
 
 /// How the platform end moves, and with it the leg's length and direction \[T2\]-\[T4\].
 #[derive(Clone, Copy, Debug)]
-pub struct Motion<T> {
+pub struct End<T> {
     pub v_b: Vec3<T>,
     pub a_b: Vec3<T>,
     pub rate: T,
@@ -63,7 +63,8 @@ pub struct Motion<T> {
 }
 
 #[inline(always)]
-pub fn motion<T: Real>(p: &Position<T>, twist: &Twist<T>, acceleration: &Acceleration<T>) -> Motion<T> {
+pub fn end<T: Real>(p: &Position<T>, platform: &Motion<T>) -> End<T> {
+    let Motion { twist, acceleration, .. } = platform;
     let (omega, e, delta, inverse) = (twist.omega, p.e, p.delta, T::one() / p.length);
     // [Eq. 20] [T2] v_b = v + ω×e;  [Eq. 34] a_b = a + ε×e + ω×(ω×e)
     let spin_e = omega.cross(e);
@@ -75,7 +76,7 @@ pub fn motion<T: Real>(p: &Position<T>, twist: &Twist<T>, acceleration: &Acceler
     // [Eq. 15] [T4] ℓ'' = δ·a_b + v_b·δ';  δ'' = (a_b - ℓ''δ - 2ℓ'δ')/ℓ
     let second = delta.dot(a_b) + v_b.dot(delta_rate);
     let delta_acceleration = (a_b - delta * second - delta_rate * (rate + rate)) * inverse;
-    Motion { v_b, a_b, rate, acceleration: second, delta_rate, delta_acceleration }
+    End { v_b, a_b, rate, acceleration: second, delta_rate, delta_acceleration }
 }
 
 /// The leg's frame at a pose, and what the spin needs of it \[T5\].
@@ -129,13 +130,12 @@ pub struct Turn<T> {
 #[inline(always)]
 pub fn turn<T: Real>(
     leg: &Leg,
-    pose: &Pose<T>,
+    platform: &Motion<T>,
     p: &Position<T>,
-    m: &Motion<T>,
+    end: &End<T>,
     f: &Frame<T>,
-    twist: &Twist<T>,
-    acceleration: &Acceleration<T>,
 ) -> Turn<T> {
+    let Motion { pose, twist, acceleration } = platform;
     let (u, moves) = turning_axis(leg.turning, pose);
     // u' = ω_u × u, u'' = ε_u × u + ω_u × u', with ω_u that of the body u is fixed in
     let (u1, u2) = if moves {
@@ -147,10 +147,10 @@ pub fn turn<T: Real>(
     // N = |N| n and its first two rates
     let (normal1, normal2) = match leg.turning {
         Turning::Across(..) => {
-            let mixed = u1.cross(m.delta_rate);
+            let mixed = u1.cross(end.delta_rate);
             (
-                u1.cross(p.delta) + u.cross(m.delta_rate),
-                u2.cross(p.delta) + mixed + mixed + u.cross(m.delta_acceleration),
+                u1.cross(p.delta) + u.cross(end.delta_rate),
+                u2.cross(p.delta) + mixed + mixed + u.cross(end.delta_acceleration),
             )
         }
         Turning::Along(..) => (u1, u2),
@@ -161,25 +161,38 @@ pub fn turn<T: Real>(
     let spin = normal1.dot(f.w);
     let stretch = f.n().dot(normal1) * inverse;
     let spin_rate =
-        normal2.dot(f.w) + normal1.dot(m.delta_rate.cross(f.n())) * inverse - (spin + spin) * stretch;
+        normal2.dot(f.w) + normal1.dot(end.delta_rate.cross(f.n())) * inverse - (spin + spin) * stretch;
     // [T6] ω = δ×δ' + sδ;  ε = δ×δ'' + s'δ + sδ'
     Turn {
         spin,
         spin_rate,
-        omega: p.delta.cross(m.delta_rate) + p.delta * spin,
-        eps: p.delta.cross(m.delta_acceleration) + p.delta * spin_rate + m.delta_rate * spin,
+        omega: p.delta.cross(end.delta_rate) + p.delta * spin,
+        eps: p.delta.cross(end.delta_acceleration) + p.delta * spin_rate + end.delta_rate * spin,
     }
+}
+
+/// All of a leg at an instant.
+#[derive(Clone, Copy, Debug)]
+pub struct State<T> {
+    pub position: Position<T>,
+    pub end: End<T>,
+    pub frame: Frame<T>,
+    pub turn: Turn<T>,
+}
+
+#[inline(always)]
+pub fn state<T: Real>(leg: &Leg, platform: &Motion<T>) -> State<T> {
+    let position = position(leg, &platform.pose);
+    let end = end(&position, platform);
+    let frame = frame(leg, &platform.pose, &position);
+    let turn = turn(leg, platform, &position, &end, &frame);
+    State { position, end, frame, turn }
 }
 
 /// Carries a force F at b and a torque M on the leg to the platform: `F·v_b + M·ω_leg` as a wrench at o \[T14\].
 #[inline(always)]
-pub fn carry<T: Real>(
-    leg: &Leg,
-    p: &Position<T>,
-    f: &Frame<T>,
-    force: Vec3<T>,
-    torque: Vec3<T>,
-) -> Wrench<T> {
+pub fn carry<T: Real>(leg: &Leg, state: &State<T>, force: Vec3<T>, torque: Vec3<T>) -> Wrench<T> {
+    let State { position: p, frame: f, .. } = state;
     // M·ω_leg = (M×δ)·δ' + (M·δ) s, and s = N'·w is linear in δ' (through u×δ') and in ω_u (through u').
     let about = torque.dot(p.delta);
     let (direction, turning) = match leg.turning {
@@ -219,16 +232,18 @@ fn point_motion<T: Real>(
     }
 }
 
-/// The piston's mass centre, offset from b [Eq. 38, 39].
+/// The piston's mass centre, offset from b [Eq. 38, 39] \[T8\].
 #[inline(always)]
-pub fn piston<T: Real>(leg: &Leg, m: &Motion<T>, f: &Frame<T>, turn: &Turn<T>) -> PointMotion<T> {
-    point_motion(turn, f.axes * Vec3::lift(leg.piston.center), m.v_b, m.a_b)
+pub fn piston<T: Real>(leg: &Leg, state: &State<T>) -> PointMotion<T> {
+    let offset = state.frame.axes * Vec3::lift(leg.piston.center);
+    point_motion(&state.turn, offset, state.end.v_b, state.end.a_b)
 }
 
-/// The cylinder's mass centre, offset from B [Eq. 38, 39].
+/// The cylinder's mass centre, offset from B [Eq. 38, 39] \[T8\].
 #[inline(always)]
-pub fn cylinder<T: Real>(leg: &Leg, f: &Frame<T>, turn: &Turn<T>) -> PointMotion<T> {
-    point_motion(turn, f.axes * Vec3::lift(leg.cylinder.center), Vec3::zero(), Vec3::zero())
+pub fn cylinder<T: Real>(leg: &Leg, state: &State<T>) -> PointMotion<T> {
+    let offset = state.frame.axes * Vec3::lift(leg.cylinder.center);
+    point_motion(&state.turn, offset, Vec3::zero(), Vec3::zero())
 }
 
 /// How a rod turns about its own line, from the leg that leads it \[T7\].
@@ -240,12 +255,13 @@ pub struct RodTurn<T> {
 
 /// [Eq. 25, 36, 37] \[T7\] `ω_L = n·δ'/|L×δ|`, and its rate.
 #[inline(always)]
-pub fn rod_turn<T: Real>(axis: Vec3<T>, m: &Motion<T>, f: &Frame<T>, turn: &Turn<T>) -> RodTurn<T> {
+pub fn rod_turn<T: Real>(axis: Vec3<T>, leader: &State<T>) -> RodTurn<T> {
+    let State { end, frame: f, turn, .. } = leader;
     let inverse = T::one() / f.sine;
-    let rate = f.n().dot(m.delta_rate) * inverse;
+    let rate = f.n().dot(end.delta_rate) * inverse;
     // n' = ω_leg × n, and |L×δ|' = n·(L×δ')
     let n1 = turn.omega.cross(f.n());
-    let sine1 = f.n().dot(axis.cross(m.delta_rate));
-    let acceleration = (n1.dot(m.delta_rate) + f.n().dot(m.delta_acceleration) - rate * sine1) * inverse;
+    let sine1 = f.n().dot(axis.cross(end.delta_rate));
+    let acceleration = (n1.dot(end.delta_rate) + f.n().dot(end.delta_acceleration) - rate * sine1) * inverse;
     RodTurn { rate, acceleration }
 }

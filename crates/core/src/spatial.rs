@@ -297,6 +297,14 @@ pub struct Wrench<T> {
     pub torque: Vec3<T>,
 }
 
+/// How the platform moves at an instant.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Motion<T> {
+    pub pose: Pose<T>,
+    pub twist: Twist<T>,
+    pub acceleration: Acceleration<T>,
+}
+
 macro_rules! six_vector {
     ($name:ident, $linear:ident, $angular:ident) => {
         impl<T: Real> $name<T> {

@@ -5,13 +5,13 @@ mod common;
 
 use common::{Draw, close, every_leg, moving, parts, published, states, with_leg};
 use polypod_core::constraint;
-use polypod_core::coordinates::{Set, State};
+use polypod_core::coordinates::Set;
 use polypod_core::dynamics;
 use polypod_core::jacobian;
 use polypod_core::leg;
 use polypod_core::mechanism::Mechanism;
 use polypod_core::real::{Dual, F, Real};
-use polypod_core::spatial::{Acceleration, Mat3, Pose, Twist, Vec3, Wrench};
+use polypod_core::spatial::{Acceleration, Mat3, Motion, Pose, Twist, Vec3, Wrench};
 
 /// Relative, for second derivatives by two routes in double precision.
 const EXACT: f64 = 1e-10;
@@ -26,7 +26,7 @@ fn mechanisms() -> Vec<Mechanism> {
 }
 
 /// States to test at: generic ones, and for the published manipulator its nearly singular neighbourhood of home.
-fn samples(mech: &Mechanism) -> Vec<State> {
+fn samples(mech: &Mechanism) -> Vec<Motion<f64>> {
     states(mech, 6, 11)
 }
 
@@ -55,7 +55,7 @@ fn leg_motion_is_the_derivative_of_leg_position() {
             for leg in &mech.legs {
                 let jet = leg::position(leg, &moving(&state));
                 let p = leg::position(leg, &state.pose);
-                let m = leg::motion(&p, &state.twist, &state.acceleration);
+                let m = leg::end(&p, &state);
                 let [_, r1, r2] = parts(jet.r);
                 let [_, d1, d2] = parts(jet.delta);
                 close(m.v_b, r1, EXACT, "v_b");
@@ -85,12 +85,9 @@ fn leg_turning_is_the_derivative_of_the_leg_frame() {
                     let [x, d, dd] = parts(column);
                     angular = [angular[0] + x.cross(d) * 0.5, angular[1] + x.cross(dd) * 0.5];
                 }
-                let p = leg::position(leg, &state.pose);
-                let m = leg::motion(&p, &state.twist, &state.acceleration);
-                let f = leg::frame(leg, &state.pose, &p);
-                let turn = leg::turn(leg, &state.pose, &p, &m, &f, &state.twist, &state.acceleration);
-                close(turn.omega, angular[0], EXACT, &format!("{name}: ω"));
-                close(turn.eps, angular[1], 10.0 * EXACT, &format!("{name}: ε"));
+                let whole = leg::state(leg, &state);
+                close(whole.turn.omega, angular[0], EXACT, &format!("{name}: ω"));
+                close(whole.turn.eps, angular[1], 10.0 * EXACT, &format!("{name}: ε"));
             }
         }
     }
@@ -104,14 +101,11 @@ fn links_move_as_their_mass_centres_do() {
             for leg in mech.legs.iter().filter(|l| l.letters() != "SPS") {
                 let pj = leg::position(leg, &moving);
                 let fj = leg::frame(leg, &moving, &pj);
-                let p = leg::position(leg, &state.pose);
-                let m = leg::motion(&p, &state.twist, &state.acceleration);
-                let f = leg::frame(leg, &state.pose, &p);
-                let turn = leg::turn(leg, &state.pose, &p, &m, &f, &state.twist, &state.acceleration);
+                let whole = leg::state(leg, &state);
                 let piston = parts(pj.r + fj.axes * Vec3::lift(leg.piston.center));
                 let cylinder = parts(fj.axes * Vec3::lift(leg.cylinder.center));
                 for (found, exact) in
-                    [(leg::piston(leg, &m, &f, &turn), piston), (leg::cylinder(leg, &f, &turn), cylinder)]
+                    [(leg::piston(leg, &whole), piston), (leg::cylinder(leg, &whole), cylinder)]
                 {
                     close(found.velocity, exact[1], EXACT, "velocity");
                     close(found.acceleration, exact[2], 10.0 * EXACT, "acceleration");
@@ -131,11 +125,8 @@ fn the_rod_turns_as_its_plane_does() {
                 let jet = moving(&state);
                 let n = leg::frame(leg, &jet, &leg::position(leg, &jet)).n();
                 let [x, d, dd] = parts(n);
-                let p = leg::position(leg, &state.pose);
-                let m = leg::motion(&p, &state.twist, &state.acceleration);
-                let f = leg::frame(leg, &state.pose, &p);
-                let turn = leg::turn(leg, &state.pose, &p, &m, &f, &state.twist, &state.acceleration);
-                let found = leg::rod_turn(rod.axis, &m, &f, &turn);
+                let whole = leg::state(leg, &state);
+                let found = leg::rod_turn(rod.axis, &whole);
                 close(rod.axis * found.rate, x.cross(d), EXACT, "ω_L");
                 close(rod.axis * found.acceleration, x.cross(dd), EXACT, "ε_L");
             }
@@ -192,12 +183,9 @@ fn carrying_a_wrench_keeps_its_power() {
         for state in samples(&mech) {
             for leg in &mech.legs {
                 let (force, torque) = (draw.vector(), draw.vector());
-                let p = leg::position(leg, &state.pose);
-                let m = leg::motion(&p, &state.twist, &state.acceleration);
-                let f = leg::frame(leg, &state.pose, &p);
-                let turn = leg::turn(leg, &state.pose, &p, &m, &f, &state.twist, &state.acceleration);
-                let power = force.dot(m.v_b) + torque.dot(turn.omega);
-                let carried = leg::carry(leg, &p, &f, force, torque).power(&state.twist);
+                let whole = leg::state(leg, &state);
+                let power = force.dot(whole.end.v_b) + torque.dot(whole.turn.omega);
+                let carried = leg::carry(leg, &whole, force, torque).power(&state.twist);
                 assert!(
                     (carried - power).abs() <= EXACT * power.abs().max(1.0),
                     "{} {}",
@@ -216,12 +204,11 @@ fn power_balances() {
     for mech in mechanisms() {
         for state in samples(&mech) {
             let load = dynamics::load_in_base(mech.load.wrench, mech.load.axes, &state.pose);
-            let (f, _) =
-                dynamics::inverse_dynamics(&mech, &state.pose, &state.twist, &state.acceleration, load);
+            let (f, _) = dynamics::inverse_dynamics(&mech, &state, load);
             let rates =
                 jacobian::jacobian(&mech, &state.pose).map(|row| Wrench::from_array(row).power(&state.twist));
             let actuators: f64 = f.iter().zip(&rates).take(mech.dof()).map(|(f, r)| f * r).sum();
-            let own = load + dynamics::platform_wrench(&mech, &state.pose, &state.twist, &state.acceleration);
+            let own = load + dynamics::platform_wrench(&mech, &state);
             let (kinetic, potential) = energy_rates(&mech, &state);
             let damping = -(mech.linear_damping * state.twist.v.dot(state.twist.v)
                 + mech.angular_damping * state.twist.omega.dot(state.twist.omega));
@@ -234,7 +221,7 @@ fn power_balances() {
     }
 }
 
-fn energy_rates(mech: &Mechanism, state: &State) -> (f64, f64) {
+fn energy_rates(mech: &Mechanism, state: &Motion<f64>) -> (f64, f64) {
     let dual =
         |x: Vec3<f64>, d: Vec3<f64>| Vec3::new(Dual::new(x.x, d.x), Dual::new(x.y, d.y), Dual::new(x.z, d.z));
     let pose = Pose {
@@ -249,15 +236,15 @@ fn energy_rates(mech: &Mechanism, state: &State) -> (f64, f64) {
     (kinetic.d, potential.d)
 }
 
-fn forces<T: Real>(mech: &Mechanism, state: &State) -> [f64; 6] {
+fn forces<T: Real>(mech: &Mechanism, state: &Motion<f64>) -> [f64; 6] {
     let lift = Vec3::<T>::lift;
-    let (result, _) = dynamics::inverse_dynamics(
-        mech,
-        &Pose::lift(&state.pose),
-        &Twist::new(lift(state.twist.v), lift(state.twist.omega)),
-        &Acceleration::new(lift(state.acceleration.a), lift(state.acceleration.eps)),
-        Wrench::new(lift(mech.load.wrench.force), lift(mech.load.wrench.torque)),
-    );
+    let platform = Motion {
+        pose: Pose::lift(&state.pose),
+        twist: Twist::new(lift(state.twist.v), lift(state.twist.omega)),
+        acceleration: Acceleration::new(lift(state.acceleration.a), lift(state.acceleration.eps)),
+    };
+    let load = Wrench::new(lift(mech.load.wrench.force), lift(mech.load.wrench.torque));
+    let (result, _) = dynamics::inverse_dynamics(mech, &platform, load);
     result.map(Real::value)
 }
 
@@ -296,8 +283,8 @@ fn duals_differentiate_the_inverse_dynamics() {
         let acceleration =
             Acceleration::new(Vec3::lift(state.acceleration.a), Vec3::lift(state.acceleration.eps));
         let load = Wrench::new(Vec3::lift(mech.load.wrench.force), Vec3::lift(mech.load.wrench.torque));
-        let (exact, _) =
-            dynamics::inverse_dynamics(&mech, &Pose::lift(&state.pose), &twist, &acceleration, load);
+        let platform = Motion { pose: Pose::lift(&state.pose), twist, acceleration };
+        let (exact, _) = dynamics::inverse_dynamics(&mech, &platform, load);
         // Forces are quadratic in the twist: central differences are exact up to rounding.
         let (above, below) = (at(0.5), at(-0.5));
         let scale = exact.iter().fold(0.0_f64, |m, f| m.max(f.d.abs()));
@@ -311,12 +298,8 @@ fn duals_differentiate_the_inverse_dynamics() {
 fn acceleration_from_the_legs_is_the_acceleration_of_the_platform() {
     for mech in mechanisms() {
         for state in samples(&mech) {
-            let motions: Vec<_> = mech
-                .actuated()
-                .map(|(_, leg)| {
-                    leg::motion(&leg::position(leg, &state.pose), &state.twist, &state.acceleration)
-                })
-                .collect();
+            let motions: Vec<_> =
+                mech.actuated().map(|(_, leg)| leg::end(&leg::position(leg, &state.pose), &state)).collect();
             let rates: Vec<f64> = motions.iter().map(|m| m.rate).collect();
             let seconds: Vec<f64> = motions.iter().map(|m| m.acceleration).collect();
             let (twist, pivots) = jacobian::platform_twist(&mech, &state.pose, &rates);

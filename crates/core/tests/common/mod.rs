@@ -2,11 +2,11 @@
 
 #![allow(dead_code)] // each test file uses its share
 
-use polypod_core::coordinates::{self, MAX_COORDINATES, Set, State};
+use polypod_core::coordinates::{self, MAX_COORDINATES, Set};
 use polypod_core::mechanism::Mechanism;
 use polypod_core::mobility;
 use polypod_core::real::Jet;
-use polypod_core::spatial::{Mat3, Pose, Vec3};
+use polypod_core::spatial::{Mat3, Motion, Pose, Vec3};
 use polypod_core::spec::Spec;
 use polypod_core::status::Status;
 
@@ -164,7 +164,7 @@ fn rotation_vector(r: &Mat3<f64>) -> Vec3<f64> {
 
 /// States that keep the constraints: a pose near home and a motion through it, made with the coordinate set `pose`,
 /// whose independent coordinates are the first that determine the others.
-pub fn states(mech: &Mechanism, count: usize, seed: u64) -> Vec<State> {
+pub fn states(mech: &Mechanism, count: usize, seed: u64) -> Vec<Motion<f64>> {
     let mut draw = Draw::new(seed);
     let mut result = Vec::new();
     'next: for _ in 0..200 {
@@ -190,9 +190,9 @@ pub fn states(mech: &Mechanism, count: usize, seed: u64) -> Vec<State> {
                 Jet::new(at[k], d, dd)
             });
             let state = coordinates::state(mech, &Set::Pose, &q, &given, 1.0, &pose);
-            let speed = state.twist.v.norm() + state.twist.omega.norm();
+            let speed = state.platform.twist.v.norm() + state.platform.twist.omega.norm();
             if state.status == Status::Ok && speed < 20.0 {
-                result.push(state);
+                result.push(state.platform);
                 continue 'next;
             }
         }
@@ -202,7 +202,7 @@ pub fn states(mech: &Mechanism, count: usize, seed: u64) -> Vec<State> {
 }
 
 /// The pose as it moves: columns of R and o with their rates.
-pub fn moving(state: &State) -> Pose<Jet<f64>> {
+pub fn moving(state: &Motion<f64>) -> Pose<Jet<f64>> {
     let (w, eps) = (state.twist.omega, state.acceleration.eps);
     let column = |c: Vec3<f64>| {
         let d = w.cross(c);
