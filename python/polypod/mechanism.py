@@ -101,7 +101,10 @@ class CoupledForces(NamedTuple):
 
     legs: tuple[str, str]
     forces: Array
-    """(..., 2): f_c1 and f_c3 along c_1 = r_1×L/|r_1×L| on the platform at b_1 and b_3, N."""
+    """(..., 2): f_c1 and f_c3 on the platform at b_1 and b_3 along c_1 = r_1×L/|r_1×L|, N.
+
+    As printed, f_c3 is along c_3 = -c_1.
+    """
     torque: Array
     """(...): T_c about the rod's line, N m."""
     status: Codes
@@ -176,8 +179,10 @@ class Mobility:
     passive: int
     """Freedoms that leave the platform where it is: M_0 of Eq. 1."""
     passive_legs: tuple[str, ...]
+    uncontrolled: int
+    """Freedoms that remain at generic poses with all actuators locked: zero unless the design is singular."""
     constraint_rows: tuple[tuple[str, str], ...]
-    """Leg and kind (A-D) of every scalar constraint."""
+    """Leg and kind (A-E) of every scalar constraint."""
     independent_rows: tuple[int, ...]
     """Indices of those that are independent."""
     graph_links: tuple[GraphLink, ...]
@@ -312,7 +317,12 @@ class Mechanism:
         """What a user of this mechanism should know, in plain words."""
         mobility, notes = self.mobility(), []
         sigma = self.conditioning(self.home)
-        if not sigma.sigma_min > NEAR_SINGULAR:
+        if mobility.uncontrolled:
+            notes.append(
+                f"singular by design: with all actuators locked the platform keeps {mobility.uncontrolled} of its "
+                "freedoms at every pose, so that forces and velocities are not determined anywhere."
+            )
+        elif not sigma.sigma_min > NEAR_SINGULAR:
             notes.append(
                 "nearly singular at its centre pose: the smallest singular value is "
                 f"{float(sigma.sigma_min):.2g} against {float(sigma.sigma_max):.2g} for the largest. "
@@ -333,7 +343,7 @@ class Mechanism:
         return notes
 
     def mobility(self) -> Mobility:
-        """Freedoms, joints, redundant constraints and passive freedoms from generic ranks [Eq. 1] [T18]."""
+        """Freedoms, joints, redundant constraints and passive freedoms from generic ranks [Eq. 1, T18]."""
         m = json.loads(self._core.mobility())
         names = self.leg_names
         graph, published = m["graph"], self._data.get("published")
@@ -342,6 +352,7 @@ class Mechanism:
             redundant=m["redundant"],
             redundant_legs=tuple(names[i] for i in m["redundant_legs"]),
             passive=m["passive"],
+            uncontrolled=m["uncontrolled"],
             passive_legs=tuple(names[i] for i in m["passive_legs"]),
             constraint_rows=tuple((names[c["leg"]], c["kind"]) for c in m["constraints"]),
             independent_rows=tuple(i for i, c in enumerate(m["constraints"]) if c["independent"]),

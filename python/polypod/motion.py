@@ -70,6 +70,10 @@ class HasCoordinateSets(Protocol):
     """What a motion needs of a mechanism."""
 
     @property
+    def dof(self) -> int:
+        """Freedoms of the platform."""
+
+    @property
     def coordinate_sets(self) -> CoordinateSets:
         """Names of the coordinates of each set."""
 
@@ -237,11 +241,10 @@ def load_motion(
     `wrench_axes` replace what a TOML file says; without them a CSV file means 1 and "base".
     Raises MotionError with all faults of the file, UnknownNameError for a built-in that does not exist.
     """
-    sets = mech if isinstance(mech, Mapping) else mech.coordinate_sets
     file = _find(source)
     read = _read_csv if file.name.endswith(".csv") else _read_toml
     try:
-        motion = read(file.read_text(encoding="utf-8-sig"), str(source), sets)
+        motion = read(file.read_text(encoding="utf-8-sig"), str(source), mech)
     except FileNotFoundError:
         raise MotionError([Fault("file", "does not exist")], str(source)) from None
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
@@ -268,6 +271,19 @@ def _find(source: str | PathLike[str]) -> Traversable:
     raise UnknownNameError("built-in motion (nor a .csv or .toml file)", str(source), built_in)
 
 
+def _sets(mech: HasCoordinateSets | CoordinateSets, names: Iterable[str]) -> CoordinateSets:
+    """The coordinate sets to choose from.
+
+    Of the set `pose` those that `names` gives, if they are as many as the mechanism has freedoms: the others are
+    then dependent.
+    """
+    if isinstance(mech, Mapping):
+        return mech
+    sets, given = dict(mech.coordinate_sets), set(names)
+    independent = tuple(name for name in sets.get("pose", ()) if name in given)
+    return sets | {"pose": independent} if len(independent) == mech.dof else sets
+
+
 def _nearest_set(names: Iterable[str], sets: CoordinateSets) -> str:
     """The coordinate set that differs least from the names given."""
     given = set(names)
@@ -283,7 +299,7 @@ class _Column(NamedTuple):
     unit: str
 
 
-def _read_csv(text: str, source: str, sets: CoordinateSets) -> Motion:
+def _read_csv(text: str, source: str, mech: HasCoordinateSets | CoordinateSets) -> Motion:
     reader = csv.reader(text.splitlines(), skipinitialspace=True)
     rows = [(f"line {reader.line_num}", [cell.strip() for cell in row]) for row in reader]
     rows = [(place, row) for place, row in rows if any(row) and not row[0].startswith("#")]
@@ -292,6 +308,7 @@ def _read_csv(text: str, source: str, sets: CoordinateSets) -> Motion:
         raise MotionError([Fault("file", message)], source)
     (place, header), *body = rows
     faults: list[Fault] = []
+    sets = _sets(mech, [cell.partition("[")[0].strip() for cell in header])
     columns = _columns(header, place, sets, faults)
     samples = _samples(body, columns, faults)
     if faults:
@@ -404,7 +421,7 @@ class _Wrench(Table):
 _SECTIONS = ("motion", "units", "wrench", "keyframes")
 
 
-def _read_toml(text: str, source: str, sets: CoordinateSets) -> Motion:
+def _read_toml(text: str, source: str, mech: HasCoordinateSets | CoordinateSets) -> Motion:
     data = tomllib.loads(text)
     faults = [Fault(k, f"is no key here; {alternatives(k, _SECTIONS)}") for k in data if k not in _SECTIONS]
     settings = read_table(_Settings, data.get("motion", {}), "motion", faults)
@@ -414,12 +431,14 @@ def _read_toml(text: str, source: str, sets: CoordinateSets) -> Motion:
         faults.append(Fault("keyframes", "needs two tables [[keyframes]] or more"))
         tables = []
 
+    given = {key for table in tables if isinstance(table, dict) for key in table}
+    sets = _sets(mech, given)
     chosen = settings.coordinates if settings else ""
     if chosen not in sets:
         if settings:
             message = f"is {shown(chosen)}, no coordinate set of the mechanism; {alternatives(chosen, sets)}"
             faults.append(Fault("motion.coordinates", message))
-        chosen = _nearest_set({key for table in tables if isinstance(table, dict) for key in table}, sets)
+        chosen = _nearest_set(given, sets)
     model = _keyframe(sets[chosen])
     read = [read_table(model, table, f"keyframes.{i}", faults) for i, table in enumerate(tables, 1)]
     frames = [frame.model_dump() for frame in read if frame]

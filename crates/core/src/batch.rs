@@ -1,7 +1,7 @@
 //! Many states at once: arrays in, a [`Table`] out, one status per state, NaN where there is no answer.
 
 use crate::constraint;
-use crate::coordinates::{self, MAX_COORDINATES, Set, Values};
+use crate::coordinates::{self, MAX_COORDINATES, Set, State, Values};
 use crate::dynamics;
 use crate::jacobian;
 use crate::joints::{self, Zero};
@@ -110,14 +110,13 @@ fn read_pose(mech: &Mechanism, poses: &[f64], i: usize) -> (Pose<f64>, Status) {
     let valid = m.iter().all(|x| x.is_finite())
         && m[12..] == [0.0, 0.0, 0.0, 1.0]
         && pose.rotation.rotation_error() <= ROTATION_TOLERANCE;
-    let status = if !valid {
-        Status::InvalidInput
-    } else if mech.constraint_distance(&pose) <= CONSTRAINT_TOLERANCE * mech.characteristic_length {
-        Status::Ok
-    } else {
-        Status::OffConstraint
-    };
-    (pose, status)
+    (pose, if valid { check_pose(mech, &pose) } else { Status::InvalidInput })
+}
+
+/// Whether a pose satisfies the constraints.
+fn check_pose(mech: &Mechanism, pose: &Pose<f64>) -> Status {
+    let kept = mech.constraint_distance(pose) <= CONSTRAINT_TOLERANCE * mech.characteristic_length;
+    if kept { Status::Ok } else { Status::OffConstraint }
 }
 
 /// Whether a twist keeps the constraints: `(c, τ)·V = 0`.
@@ -554,6 +553,7 @@ pub fn states(mech: &Mechanism, input: &Coordinates, n: usize) -> Table {
     );
     let mask: Vec<bool> =
         (0..MAX_COORDINATES).map(|k| k >= names.len() || input.given[k].is_some()).collect();
+    let all_given = mask.iter().all(|&given| given) && !mech.independent.is_empty();
     let (mut last, mut branch) = (mech.home, f64::NAN);
     for i in 0..n {
         let q: Values<Jet<f64>> = std::array::from_fn(|k| match input.given.get(k).copied().flatten() {
@@ -568,6 +568,7 @@ pub fn states(mech: &Mechanism, input: &Coordinates, n: usize) -> Table {
             _ => last,
         };
         let state = coordinates::state(mech, &input.set, &q, &mask, input.branch, &guess);
+        let state = checked(mech, state, all_given);
         let jumped = input.continued && state.status == Status::Ok && state.branch * branch < 0.0;
         table.status[i] = if jumped { Status::BranchJump } else { state.status };
         let solved = matches!(table.status[i], Status::Ok | Status::Fold);
@@ -595,6 +596,16 @@ pub fn states(mech: &Mechanism, input: &Coordinates, n: usize) -> Table {
         }
     }
     table
+}
+
+/// A state whose coordinates were all given breaks the constraints unless they happen to fit.
+fn checked(mech: &Mechanism, mut state: State, all_given: bool) -> State {
+    let Motion { pose, twist, acceleration } = &state.platform;
+    if all_given && state.status == Status::Ok {
+        state.status = then(check_pose(mech, pose), || check_twist(mech, pose, twist));
+        state.status = then(state.status, || check_acceleration(mech, pose, twist, acceleration));
+    }
+    state
 }
 
 /// The numbers of a set at each pose: the inverse of [`states`].

@@ -1,9 +1,10 @@
-//! The scalar constraints that legs put on the platform: four kinds, each with its value, its wrench (the row of
+//! The scalar constraints that legs put on the platform: five kinds, each with its value, its wrench (the row of
 //! the Jacobian) and its Hessian \[T9\]-\[T12\].
 
+use crate::leg;
 use crate::mechanism::{Leg, Side, Turning};
 use crate::real::Real;
-use crate::spatial::{Pose, Vec3, Wrench};
+use crate::spatial::{Mat3, Pose, Vec3, Wrench};
 use crate::spec::JointKind;
 
 /// A 6×6 block of the Hessian, rows and columns as (v, ω).
@@ -19,6 +20,8 @@ pub enum ConstraintKind {
     C,
     /// R or F against U, R or F: two axes are square, `a_B·a_P = 0`.
     D,
+    /// Two legs on one rod: their planes through its line L keep their angle, `(Q r_1 × r)·L = 0`.
+    E,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -31,7 +34,24 @@ pub struct Constraint {
     /// Unit axes: L or a_B in base axes, l or a_P in platform axes; zero where the kind has none.
     pub base_axis: Vec3<f64>,
     pub platform_axis: Vec3<f64>,
+    /// Kind E only; of no effect elsewhere.
+    pub partner: Partner,
 }
+
+/// The first leg on the rod of a constraint of kind E.
+#[derive(Clone, Copy, Debug)]
+pub struct Partner {
+    pub base_point: Vec3<f64>,
+    pub platform_point: Vec3<f64>,
+    /// Q, the constant turn about L that takes the plane of the first leg into that of the second.
+    pub turn: Mat3<f64>,
+}
+
+const NO_PARTNER: Partner = Partner {
+    base_point: Vec3 { x: 0.0, y: 0.0, z: 0.0 },
+    platform_point: Vec3 { x: 0.0, y: 0.0, z: 0.0 },
+    turn: Mat3([Vec3::X, Vec3::Y, Vec3::Z]),
+};
 
 /// The constraints of one leg, from what its two joints say about its direction δ and its normal n.
 #[must_use]
@@ -43,6 +63,7 @@ pub fn of_leg(index: usize, leg: &Leg) -> Vec<Constraint> {
         platform_point: leg.platform.point,
         base_axis,
         platform_axis,
+        partner: NO_PARTNER,
     };
     let none = Vec3::zero();
     // A fixed joint holds δ as well: the leg is square to two axes of the body.
@@ -85,6 +106,34 @@ pub fn of_leg(index: usize, leg: &Leg) -> Vec<Constraint> {
     }
 }
 
+/// The constraints of a rod that carries several legs: its revolute axes are fixed in it, so that the legs' planes
+/// through its line keep the angle that they have at home. L is divided by a length to make g one.
+#[must_use]
+pub fn of_rod(mech_legs: &[Leg], rod: usize, axis: Vec3<f64>, home: &Pose<f64>) -> Vec<Constraint> {
+    let on: Vec<usize> = (0..mech_legs.len()).filter(|&i| mech_legs[i].rod == Some(rod)).collect();
+    let Some((&leader, others)) = on.split_first() else { return vec![] };
+    let across = |i: usize| axis.cross(leg::position(&mech_legs[i], home).r);
+    let first = across(leader);
+    let make = |&i: &usize| {
+        let second = across(i);
+        let angle = first.cross(second).dot(axis).atan2(first.dot(second));
+        Constraint {
+            kind: ConstraintKind::E,
+            leg: i,
+            base_point: mech_legs[i].base.point,
+            platform_point: mech_legs[i].platform.point,
+            base_axis: axis * (1.0 / first.norm()),
+            platform_axis: Vec3::zero(),
+            partner: Partner {
+                base_point: mech_legs[leader].base.point,
+                platform_point: mech_legs[leader].platform.point,
+                turn: Mat3::from_rotation_vector(axis * angle),
+            },
+        }
+    };
+    others.iter().map(make).collect()
+}
+
 /// What a joint says about the leg's normal n: square to an axis of its body, or along one.
 enum Normal {
     Across(Vec3<f64>),
@@ -108,35 +157,49 @@ struct Vectors<T> {
     base: Vec3<T>,
     /// l or a_P.
     platform: Vec3<T>,
+    /// Of the partner: e_1 and Q r_1.
+    e1: Vec3<T>,
+    r1: Vec3<T>,
 }
 
 #[inline(always)]
 fn vectors<T: Real>(c: &Constraint, pose: &Pose<T>) -> Vectors<T> {
     let e = pose.rotation * Vec3::lift(c.platform_point);
+    let e1 = pose.rotation * Vec3::lift(c.partner.platform_point);
     Vectors {
         e,
         r: pose.o + e - Vec3::lift(c.base_point),
         base: Vec3::lift(c.base_axis),
         platform: pose.rotation * Vec3::lift(c.platform_axis),
+        e1,
+        r1: Mat3::lift(c.partner.turn) * (pose.o + e1 - Vec3::lift(c.partner.base_point)),
     }
 }
 
-/// g(pose): metres for kinds A, B and C, a cosine for D \[T9\].
+/// The gradients of kind E with respect to b_1 and b: `Qᵀ (r × L)` and `L × Q r_1`.
+#[inline(always)]
+fn rod_forces<T: Real>(c: &Constraint, v: &Vectors<T>) -> (Vec3<T>, Vec3<T>) {
+    (Mat3::lift(c.partner.turn).transpose_mul(v.r.cross(v.base)), v.base.cross(v.r1))
+}
+
+/// g(pose): metres for kinds A, B, C and E, a cosine for D \[T9\].
 #[inline(always)]
 pub fn value<T: Real>(c: &Constraint, pose: &Pose<T>) -> T {
-    let Vectors { r, base, platform, .. } = vectors(c, pose);
+    let Vectors { r, base, platform, r1, .. } = vectors(c, pose);
     match c.kind {
         ConstraintKind::A => platform.cross(r).dot(base),
         ConstraintKind::B => r.dot(base),
         ConstraintKind::C => r.dot(platform),
         ConstraintKind::D => base.dot(platform),
+        ConstraintKind::E => r1.cross(r).dot(base),
     }
 }
 
 /// The wrench (c, τ) at o with `ġ = c·v + τ·ω` \[T10\]; for kind A it is \[Eq. 11\].
 #[inline(always)]
 pub fn row<T: Real>(constraint: &Constraint, pose: &Pose<T>) -> Wrench<T> {
-    let Vectors { e, r, base, platform } = vectors(constraint, pose);
+    let v = vectors(constraint, pose);
+    let Vectors { e, r, base, platform, .. } = v;
     match constraint.kind {
         ConstraintKind::A => {
             // [Eq. 11] c = L × l, τ = e × c - l × (L × r)
@@ -146,13 +209,18 @@ pub fn row<T: Real>(constraint: &Constraint, pose: &Pose<T>) -> Wrench<T> {
         ConstraintKind::B => Wrench::at(e, base),
         ConstraintKind::C => Wrench::new(platform, e.cross(platform) + platform.cross(r)),
         ConstraintKind::D => Wrench::new(Vec3::zero(), platform.cross(base)),
+        ConstraintKind::E => {
+            let (first, second) = rod_forces(constraint, &v);
+            Wrench::at(v.e1, first) + Wrench::at(e, second)
+        }
     }
 }
 
 /// The symmetric 6×6 matrix h with `g̈ = (c, τ)·A + Vᵀ h V` \[T12\]; for kind A the symmetric part of \[Eq. 17\].
 #[inline(always)]
 pub fn hessian<T: Real>(constraint: &Constraint, pose: &Pose<T>) -> Hessian<T> {
-    let Vectors { e, r, base, platform } = vectors(constraint, pose);
+    let v = vectors(constraint, pose);
+    let Vectors { e, r, base, platform, .. } = v;
     let mut h = [[T::zero(); 6]; 6];
     match constraint.kind {
         ConstraintKind::A => {
@@ -169,8 +237,29 @@ pub fn hessian<T: Real>(constraint: &Constraint, pose: &Pose<T>) -> Hessian<T> {
             add_mixed(&mut h, e, |w| w.cross(platform));
         }
         ConstraintKind::D => add_centripetal(&mut h, platform, base),
+        ConstraintKind::E => {
+            // g̈ = [Q a_1×r + Q r_1×a_b + 2 Q v_1×v_b]·L
+            let (first, second) = rod_forces(constraint, &v);
+            add_centripetal(&mut h, v.e1, first);
+            add_centripetal(&mut h, e, second);
+            let turn = Mat3::lift(constraint.partner.turn);
+            let (at_first, at_second) = (point_columns(v.e1), point_columns(e));
+            for i in 0..6 {
+                for j in 0..6 {
+                    let q = |i: usize, j: usize| (turn * at_first[i]).cross(at_second[j]).dot(base);
+                    h[i][j] = h[i][j] + q(i, j) + q(j, i);
+                }
+            }
+        }
     }
     h
+}
+
+/// The columns of `v + ω×e` as a linear map of the twist.
+#[inline(always)]
+pub fn point_columns<T: Real>(e: Vec3<T>) -> [Vec3<T>; 6] {
+    let axes = Mat3::<T>::identity().0;
+    std::array::from_fn(|i| if i < 3 { axes[i] } else { axes[i - 3].cross(e) })
 }
 
 /// Adds the form `[ω×(ω×x)]·y = (ω·x)(ω·y) - (x·y) ω·ω`.
@@ -189,7 +278,7 @@ pub fn add_centripetal<T: Real>(h: &mut Hessian<T>, x: Vec3<T>, y: Vec3<T>) {
 /// Adds the form `2 v_b·q(ω)` with `v_b = v + ω×e` and q linear.
 #[inline(always)]
 fn add_mixed<T: Real>(h: &mut Hessian<T>, e: Vec3<T>, q: impl Fn(Vec3<T>) -> Vec3<T>) {
-    let axes = crate::spatial::Mat3::<T>::identity().0;
+    let axes = Mat3::<T>::identity().0;
     for (j, axis) in axes.into_iter().enumerate() {
         let q = q(axis);
         let (linear, angular) = (q.array(), e.cross(q).array());

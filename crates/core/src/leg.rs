@@ -1,6 +1,6 @@
 //! One leg: where it is, how its platform end moves, how it turns, and how its links move.
 
-use crate::constraint::{Hessian, add_centripetal, turning_axis};
+use crate::constraint::{Hessian, add_centripetal, point_columns, turning_axis};
 use crate::mechanism::{Leg, Turning};
 use crate::real::Real;
 use crate::spatial::{Mat3, Motion, Pose, Vec3, Wrench};
@@ -39,10 +39,7 @@ pub fn hessian<T: Real>(p: &Position<T>) -> Hessian<T> {
     let mut h = [[T::zero(); 6]; 6];
     add_centripetal(&mut h, p.e, p.delta);
     let inverse = T::one() / p.length;
-    let axes = Mat3::<T>::identity().0;
-    let across = |v: Vec3<T>| v - p.delta * p.delta.dot(v);
-    let columns: [Vec3<T>; 6] =
-        std::array::from_fn(|i| if i < 3 { across(axes[i]) } else { across(axes[i - 3].cross(p.e)) });
+    let columns = point_columns(p.e).map(|v| v - p.delta * p.delta.dot(v));
     for i in 0..6 {
         for j in 0..6 {
             h[i][j] = columns[i].dot(columns[j]).mul_add(inverse, h[i][j]);

@@ -165,8 +165,10 @@ impl Mechanism {
         let rods: Vec<Rod> =
             spec.rods.iter().flatten().enumerate().map(|(i, rod)| make_rod(spec, i, rod)).collect();
         let legs: Vec<Leg> = spec.legs.iter().flatten().map(|leg| make_leg(leg, &rods, &home)).collect();
-        let constraints: Vec<Constraint> =
-            legs.iter().enumerate().flat_map(|(i, leg)| constraint::of_leg(i, leg)).collect();
+        let of_legs = legs.iter().enumerate().flat_map(|(i, leg)| constraint::of_leg(i, leg));
+        let of_rods =
+            rods.iter().enumerate().flat_map(|(i, rod)| constraint::of_rod(&legs, i, rod.axis, &home));
+        let constraints: Vec<Constraint> = of_legs.chain(of_rods).collect();
         let reach: f64 = legs.iter().map(|leg| leg.platform.point.dot(leg.platform.point)).sum();
         let mean_square = reach / mobility::count(legs.len());
         // A platform that is a point has no size of its own; the home lengths then set the scale.
@@ -208,7 +210,16 @@ impl Mechanism {
         mech.mobility = mobility;
         let actuators = mech.legs.iter().filter(|leg| leg.actuated).count();
         let dof = mech.dof();
-        if dof == 0 {
+        let Mobility { joint_freedoms, closure_rank, passive, .. } = mech.mobility;
+        if joint_freedoms != closure_rank + dof + passive {
+            faults.push(Fault::new(
+                "mechanism",
+                format!(
+                    "its constraints leave {dof} freedoms, but its loop closures {joint_freedoms} - {closure_rank} - \
+                     {passive}; this combination of joints is not modelled"
+                ),
+            ));
+        } else if dof == 0 {
             faults.push(Fault::new("legs", "together they leave the platform no freedom; release a joint"));
         } else if actuators < dof {
             faults.push(Fault::new(
@@ -364,6 +375,7 @@ fn home_message(mech: &Mechanism, index: usize, missed: f64) -> String {
         ConstraintKind::B => "the leg must be square to its axis in the base",
         ConstraintKind::C => "the leg must be square to its axis in the platform",
         ConstraintKind::D => "its axis in the base must be square to its axis in the platform",
+        ConstraintKind::E => "legs on one rod must keep the angle between their planes",
     };
     format!(
         "misses the constraint of leg \"{}\" ({}) by {missed:.3e} m: {meaning}{nearest}",

@@ -53,6 +53,8 @@ pub struct Mobility {
     pub passive: usize,
     /// Legs (from 0) that have them.
     pub passive_legs: Vec<usize>,
+    /// Freedoms that remain at generic poses when all actuators are locked: zero unless the design itself is singular.
+    pub uncontrolled: usize,
     /// Scalar constraints of the legs: leg (from 0) and kind, and whether it is one of the independent ones.
     pub constraints: Vec<ConstraintRow>,
     pub graph: Graph,
@@ -92,7 +94,6 @@ pub fn analyse(mech: &Mechanism) -> (Vec<Constraint>, Mobility) {
     let loops = graph.joints.len() + 1 - graph.links.len();
     let best = closures.iter().max_by_key(|c| c.rank);
     let rank = best.map_or(0, |c| c.rank).saturating_sub(6);
-    let total = freedoms - rank;
     let dof = 6 - independent.len();
     let mobility = Mobility {
         dof,
@@ -103,8 +104,9 @@ pub fn analyse(mech: &Mechanism) -> (Vec<Constraint>, Mobility) {
         closure_rank: rank,
         redundant: 6 * loops - rank,
         redundant_legs: best.map_or_else(Vec::new, |c| c.redundant_legs.clone()),
-        passive: total.saturating_sub(dof),
+        passive: best.map_or(0, |c| c.passive),
         passive_legs: best.map_or_else(Vec::new, |c| c.passive_legs.clone()),
+        uncontrolled: poses.iter().map(|pose| uncontrolled(mech, &independent, pose)).min().unwrap_or(0),
         constraints: mech
             .constraints
             .iter()
@@ -201,7 +203,7 @@ fn independent_rows(mech: &Mechanism, poses: &[Pose<f64>]) -> Vec<usize> {
         for i in 0..rows.len() {
             let mut candidate = chosen.clone();
             candidate.push(i);
-            if rank(&all.select_rows(&candidate)) == candidate.len() {
+            if rank_of(&all.select_rows(&candidate)) == candidate.len() {
                 chosen = candidate;
             }
         }
@@ -217,7 +219,7 @@ fn independent_rows(mech: &Mechanism, poses: &[Pose<f64>]) -> Vec<usize> {
     best
 }
 
-fn rank(m: &DMatrix<f64>) -> usize {
+fn rank_of(m: &DMatrix<f64>) -> usize {
     if m.nrows() == 0 {
         return 0;
     }
@@ -226,8 +228,19 @@ fn rank(m: &DMatrix<f64>) -> usize {
     values.iter().filter(|&&s| s > floor).count()
 }
 
+/// Freedoms that are left when the actuated legs keep their lengths, at a pose.
+fn uncontrolled(mech: &Mechanism, independent: &[Constraint], pose: &Pose<f64>) -> usize {
+    let size = mech.characteristic_length;
+    let legs = mech.actuated().map(|(_, leg)| leg::row(&leg::position(leg, pose)));
+    let rows: Vec<Wrench<f64>> = legs.chain(independent.iter().map(|c| constraint::row(c, pose))).collect();
+    let sizes: Vec<f64> = rows.iter().map(|row| constraint::row_size(row, size)).collect();
+    6 - rank_of(&scaled_rows(&rows, &sizes, size))
+}
+
 struct Closure {
     rank: usize,
+    /// Joint rates that leave the platform at rest.
+    passive: usize,
     redundant_legs: Vec<usize>,
     passive_legs: Vec<usize>,
 }
@@ -255,7 +268,7 @@ fn closure(mech: &Mechanism, pose: &Pose<f64>) -> Closure {
             put(&mut m, i, column, screw);
             column += 1;
         }
-        if rank(&m.view((6 * i, first), (6, screws.len())).into_owned()) < screws.len() {
+        if rank_of(&m.view((6 * i, first), (6, screws.len())).into_owned()) < screws.len() {
             passive_legs.push(i);
         }
         if let Some(rod) = mech.legs[i].rod {
@@ -265,6 +278,8 @@ fn closure(mech: &Mechanism, pose: &Pose<f64>) -> Closure {
             m[(6 * i + k, own + mech.rods.len() + k)] = -1.0;
         }
     }
+    let joints = own + mech.rods.len();
+    let passive = joints - rank_of(&m.columns(0, joints).into_owned());
     // Left null vectors are sets of leg wrenches, each unfelt by its own joints, that cancel on the platform.
     let svd = m.svd(true, false);
     let floor = svd.singular_values.max() * RANK_TOLERANCE;
@@ -273,7 +288,7 @@ fn closure(mech: &Mechanism, pose: &Pose<f64>) -> Closure {
     let felt = |row: usize| span.as_ref().map_or(1.0, |u| u.row(row).norm_squared());
     let redundant_legs =
         (0..legs.len()).filter(|&leg| (0..6).any(|k| 1.0 - felt(6 * leg + k) > 1e-6)).collect();
-    Closure { rank, redundant_legs, passive_legs }
+    Closure { rank, passive, redundant_legs, passive_legs }
 }
 
 /// The twist of a unit joint rate, at o.

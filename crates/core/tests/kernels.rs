@@ -3,7 +3,7 @@
 
 mod common;
 
-use common::{Draw, close, every_leg, moving, parts, published, states, with_leg};
+use common::{Draw, close, every_leg, moving, on_rod, parts, published, states, with_leg};
 use polypod_core::constraint;
 use polypod_core::coordinates::Set;
 use polypod_core::dynamics;
@@ -21,7 +21,7 @@ fn mechanisms() -> Vec<Mechanism> {
         .iter()
         .enumerate()
         .map(|(i, letters)| with_leg(letters, i as u64 + 1))
-        .chain([published()])
+        .chain([on_rod(1, 3), on_rod(2, 4), on_rod(3, 5), published()])
         .collect()
 }
 
@@ -46,6 +46,32 @@ fn every_leg_of_the_catalogue_has_the_freedoms_of_its_joints() {
             );
         }
     }
+}
+
+#[test]
+fn legs_on_a_rod_keep_the_angle_between_their_planes() {
+    for count in 1..=3 {
+        let mech = on_rod(count, count as u64);
+        let expected = [(5, 0), (3, 0), (2, 1)][count - 1];
+        assert_eq!((mech.dof(), mech.mobility.redundant), expected, "{count} legs on a rod");
+        let on_it: Vec<_> = mech.legs.iter().filter(|leg| leg.rod.is_some()).collect();
+        let planes = |state: &Motion<f64>| -> Vec<f64> {
+            let normals = on_it.iter().map(|leg| leg::state(leg, state).frame.n());
+            let first = leg::state(on_it[0], state).frame.n();
+            normals.map(|n| first.cross(n).dot(mech.rods[0].axis).atan2(first.dot(n))).collect()
+        };
+        let home = Motion { pose: mech.home, twist: Twist::zero(), acceleration: Acceleration::zero() };
+        for state in samples(&mech) {
+            for (at_home, now) in planes(&home).iter().zip(planes(&state)) {
+                assert!((at_home - now).abs() < 1e-12, "{count} legs: {at_home} became {now}");
+            }
+        }
+    }
+    let published = published();
+    assert_eq!(
+        (published.constraints.len(), published.independent.len(), published.mobility.redundant),
+        (3, 1, 2)
+    );
 }
 
 #[test]

@@ -77,38 +77,63 @@ fn joint(
 
 /// A mechanism with one leg of the given letters, made up with UPS legs, with generic bodies, load and damping.
 pub fn with_leg(letters: &str, seed: u64) -> Mechanism {
-    let mut draw = Draw::new(seed);
-    let rotation = Mat3::from_rotation_vector(draw.vector() * 0.4);
-    let home = (draw.vector() * 0.1 + Vec3::new(0.0, 0.0, 1.0), rotation);
     let freedoms = |l: &str| match l {
         "S" => 3,
         "U" => 2,
         "R" => 1,
         _ => 0,
     };
-    let (first, last) = (&letters[..1], &letters[2..]);
-    let dof = (freedoms(first) + freedoms(last) + 1).min(6);
+    let dof = (freedoms(&letters[..1]) + freedoms(&letters[2..]) + 1).min(6);
+    let mut legs = vec![letters.to_owned()];
+    legs.resize(dof, "UPS".to_owned());
+    generic(letters, &legs, 0, dof, seed)
+}
+
+/// A mechanism whose last `count` legs are RPU on one rod, in planes of their own, with UPS legs for what freedoms
+/// they leave. Sliding along the rod and turning about it always remain, so that the third leg adds one constraint only.
+pub fn on_rod(count: usize, seed: u64) -> Mechanism {
+    let dof: usize = [5, 3, 2][count - 1];
+    let mut legs = vec!["UPS".to_owned(); dof.saturating_sub(count).max(1)];
+    legs.resize(legs.len() + count, "RPU".to_owned());
+    generic(&format!("{count} on a rod"), &legs, count, dof, seed)
+}
+
+/// Generic legs, bodies, load and damping; the last `on_rod` legs stand on a rod, the first `actuated` are driven.
+fn generic(name: &str, letters: &[String], on_rod: usize, actuated: usize, seed: u64) -> Mechanism {
+    let mut draw = Draw::new(seed);
+    let rotation = Mat3::from_rotation_vector(draw.vector() * 0.4);
+    let home = (draw.vector() * 0.1 + Vec3::new(0.0, 0.0, 1.0), rotation);
+    let (line, point) = ((Vec3::X + draw.vector() * 0.3).unit(), draw.vector() * 0.2);
     let mut legs = Vec::new();
-    for i in 0..dof {
-        let (base, platform) = if i == 0 { (first, last) } else { ("U", "S") };
-        let (below, above) = (draw.vector() * 0.5, draw.vector() * 0.3);
+    for (i, joints) in letters.iter().enumerate() {
+        let (base, platform) = (&joints[..1], &joints[2..]);
+        let stands_on_rod = i + on_rod >= letters.len();
+        let (mut below, above) = (draw.vector() * 0.5, draw.vector() * 0.3);
+        if stands_on_rod {
+            below = point + line * draw.number();
+        }
         let delta = (home.0 + rotation * above - below).unit();
-        let n = delta.cross(draw.vector()).unit();
+        let n = if stands_on_rod { line.cross(delta).unit() } else { delta.cross(draw.vector()).unit() };
         let symmetric = base == "S" && platform == "S";
         let tilts = [0.5 * draw.number(), 0.5 * draw.number()];
+        let mut below = joint(base, below, delta, n, tilts[0], &Mat3::identity());
+        if stands_on_rod {
+            below["rod"] = 0.into();
+            below["axis"] = serde_json::Value::Null;
+        }
         legs.push(serde_json::json!({
-            "name": format!("{}", i + 1), "actuated": true, "stroke": null, "radius": null,
-            "base": joint(base, below, delta, n, tilts[0], &Mat3::identity()),
-            "platform": joint(platform, above, delta, n, tilts[1], &rotation),
+            "name": format!("{}", i + 1), "actuated": i < actuated, "stroke": null, "radius": null,
+            "base": below, "platform": joint(platform, above, delta, n, tilts[1], &rotation),
             "cylinder": body(&mut draw, symmetric), "piston": body(&mut draw, symmetric),
         }));
     }
-    let vector = rotation_vector(&rotation);
+    let rod = serde_json::json!({ "name": "L", "point": point.array(), "axis": line.array(), "body": body(&mut draw, false) });
+    let rods = if on_rod > 0 { vec![rod] } else { vec![] };
     let spec = serde_json::json!({
-        "name": letters, "legs": legs, "rods": [], "platform": body(&mut draw, false),
+        "name": name, "legs": legs, "rods": rods, "platform": body(&mut draw, false),
         "gravity": [0.3, -0.2, -9.81], "efficiency": 0.9, "linear_damping": 3.0, "angular_damping": 0.4,
         "load": { "force": [10.0, -20.0, 30.0], "torque": [4.0, 5.0, -6.0], "axes": "platform" },
-        "home": { "position": home.0.array(), "rotation_vector": vector.array() },
+        "home": { "position": home.0.array(), "rotation_vector": rotation_vector(&rotation).array() },
         "tool": { "point": [0.0, 0.0, 0.1], "axis": [0.0, 0.0, 1.0] },
     });
     make(&spec.to_string())
