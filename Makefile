@@ -70,7 +70,7 @@ clean: ## remove whatever these targets made
 $(DEPS): requirements.lock
 	@$(PYTHON) -c 'import sys; sys.exit(None if sys.version_info >= (3, 11) else "Polypod needs Python 3.11 or newer.")'
 	$(PYTHON) -m venv --clear $(VENV)
-	$(BIN)/python -m pip install --quiet --no-compile --require-hashes --requirement requirements.lock
+	$(BIN)/python -m pip install --quiet --require-hashes --requirement requirements.lock
 	@touch $@
 
 $(BUILT): $(DEPS) $(RUST) pyproject.toml

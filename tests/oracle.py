@@ -1,15 +1,15 @@
 """A second model of a mechanism, in numpy, made from positions alone.
 
-Nothing here is shared with Polypod, and the road is another one. Links have frames that are functions of the pose;
-their velocities and accelerations are the rates of those functions along a motion (`Jet`: value, rate and second
-rate), angular velocity is read off R' Rᵀ, and forces come from virtual work over directions that keep the joints
-closed. Constraints are written as what the joints hold together, not as wrenches.
+Nothing here is shared with Polypod, and the road is another one. Links have frames that are functions of
+the pose; their velocities and accelerations are the rates of those functions along a motion (`Jet`: value,
+rate and second rate), angular velocity is read off R' Rᵀ, and forces come from virtual work over directions
+that keep the joints closed. Constraints are written as what the joints hold together, not as wrenches.
 
-The second half holds the paper's equations as printed, one function for each, with the slips of the print put right
-where the docstring says so.
+The second half holds the paper's equations as printed, one function for each, with the slips of the print put
+right where the docstring says so.
 
-SI units. Poses are a pair (R, o) with shapes (..., 3, 3) and (..., 3); twists, accelerations and wrenches (..., 6),
-linear part first, in base axes, at o. A scalar that belongs to a vector keeps a last axis of length one.
+SI units. Poses are a pair (R, o) with shapes (..., 3, 3) and (..., 3); twists, accelerations and wrenches
+(..., 6), linear part first, in base axes, at o. A scalar that belongs to a vector keeps a last axis of one.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-# ---------------------------------------------------------------------------------------------------------------
+# ------------------------------------------------------------------------------------------------------------
 # Numbers with rates
-# ---------------------------------------------------------------------------------------------------------------
+# ------------------------------------------------------------------------------------------------------------
 
 
 class Jet:
@@ -132,9 +132,9 @@ def columns(*vectors) -> Jet:
     return Jet(*(np.swapaxes(a.reshape(*a.shape[:-1], 3, 3), -1, -2) for a in (flat.x, flat.d, flat.dd)))
 
 
-# ---------------------------------------------------------------------------------------------------------------
+# ------------------------------------------------------------------------------------------------------------
 # Turns
-# ---------------------------------------------------------------------------------------------------------------
+# ------------------------------------------------------------------------------------------------------------
 
 
 def skew(u):
@@ -174,7 +174,7 @@ def axis_turn(axis: int, angle) -> Jet:
 
 
 def spin_of(frame: Jet):
-    """Angular velocity and acceleration of a frame: E' Eᵀ = [ω] and E'' Eᵀ = [ε] + [ω][ω], whose last is symmetric."""
+    """Angular velocity and acceleration of a frame: E' Eᵀ = [ω]; E'' Eᵀ = [ε] + [ω][ω], last symmetric."""
     Et = np.swapaxes(frame.x, -1, -2)
     return vee(frame.d @ Et), vee(frame.dd @ Et)
 
@@ -217,9 +217,9 @@ def differentiate(f, h):
     return first, second / h**2
 
 
-# ---------------------------------------------------------------------------------------------------------------
+# ------------------------------------------------------------------------------------------------------------
 # The mechanism: a file's tables, read into SI
-# ---------------------------------------------------------------------------------------------------------------
+# ------------------------------------------------------------------------------------------------------------
 
 _UNITS = {
     "length": {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "um": 1e-6, "in": 0.0254},
@@ -327,7 +327,7 @@ LU_ANGLES = (18.0, 90.0, 162.0, 234.0, 306.0)
 
 
 def lu() -> dict:
-    """The paper's mechanism, Table II, as a file's tables. Its home is the pose with m parallel to B at 740 mm."""
+    """The paper's mechanism, Table II, as a file's tables. At home m is parallel to B, 740 mm above it."""
     legs = []
     for i, theta in enumerate(LU_ANGLES):
         on_rod = i in (0, 2)
@@ -355,15 +355,24 @@ def lu() -> dict:
         },
         "load": {"force": [10, 10, 500], "torque": [0, 0, 1000]},
         "home": {"position": [0, 120 * s18, 740]},
-        "platform": {"mass": 3, "inertia": 5},
-        "rods": [{"name": "L", "point": [0, 270 * s18, 0], "axis": [1, 0, 0], "mass": 2, "inertia": 2}],
+        "platform": {"mass": 3, "center": [0, 0, 0], "inertia": 5},
+        "rods": [
+            {
+                "name": "L",
+                "point": [0, 270 * s18, 0],
+                "axis": [1, 0, 0],
+                "mass": 2,
+                "center": [0, 0, 0],
+                "inertia": 2,
+            }
+        ],
         "legs": legs,
     }
 
 
-# ---------------------------------------------------------------------------------------------------------------
+# ------------------------------------------------------------------------------------------------------------
 # Geometry
-# ---------------------------------------------------------------------------------------------------------------
+# ------------------------------------------------------------------------------------------------------------
 
 
 @dataclass
@@ -415,7 +424,7 @@ def leg_at(spec, leg, pose) -> Leg:
         w, eps = np.cross(delta.x, delta.d), np.cross(delta.x, delta.dd)
         n = Jet(n0, np.cross(w, n0), np.cross(eps, n0) + np.cross(w, np.cross(w, n0)))
     else:
-        # Where the joints hold, N is normal to δ already; taking off the rest makes the frame one at any pose.
+        # Where the joints hold, N is square to δ already; taking off the rest makes E a frame at any pose.
         n = unit(N - dot(N, delta) * delta)
     frame = columns(n, delta, cross(n, delta))
     return Leg(e, b, r, norm(r), delta, n, frame, base_axis, platform_axis)
@@ -464,38 +473,41 @@ def links_at(spec, pose) -> list[Link]:
 
 
 def residuals(spec, pose) -> Jet:
-    """What the joints hold together, one number after the other (..., k); zero where the mechanism closes.
+    """What the joints hold together, side by side (..., k); zero where the mechanism closes.
 
-    In the leg's frame: a universal joint's two axes stay square (u·n = 0), a revolute joint's axis stays n
-    (u×n = 0), a fixed joint keeps the direction and the normal; and n is square to δ.
+    In the leg's frame (n, δ, w): a universal joint's two axes stay square (u·n = 0), a revolute joint's axis
+    is n (u·δ = u·w = 0), a fixed joint keeps direction and normal (d·n = d·w = n'·w = 0). Of the joint that n
+    was made from, what holds anyway is left out. Legs on one rod keep the angle between their normals.
     """
     R, o = jet(pose[0]), jet(pose[1])
-    parts = []
-    for leg in spec["legs"]:
-        at = leg_at(spec, leg, (R, o))
-        ends = []
+    legs = legs_at(spec, (R, o))
+    parts = [dot(o, np.zeros(3))]  # one zero, for mechanisms without constraints
+    for leg, at in zip(spec["legs"], legs, strict=True):
+        w = cross(at.n, at.delta)
         for side in ("base", "platform"):
             j = leg[side]
-            axis, normal = j["axis"], j["normal"]
-            if side == "platform":
-                axis, normal = at.platform_axis, None if normal is None else apply(R, normal)
-            elif j["rod"] is not None:
-                axis = at.base_axis
-            kind = "U" if j["rod"] is not None else j["joint"]
-            ends.append((kind, axis, normal))
-        for kind, axis, normal in ends:
-            if kind == "U":
+            on_platform = side == "platform"
+            axis = at.platform_axis if on_platform else at.base_axis
+            gives_n = side == ("platform" if leg["base"]["joint"] == "S" else "base")
+            if j["joint"] == "U" and not gives_n:
                 parts.append(dot(axis, at.n))
-            elif kind == "R":
-                parts += [cross(axis, at.n), dot(axis, at.delta)]
-            elif kind == "F":
-                parts += [cross(axis, at.delta), cross(normal, at.n)]
-    zero = jet(o) * 0.0
-    return concat([*parts, Jet(zero.x[..., :1], zero.d[..., :1], zero.dd[..., :1])])
+            elif j["joint"] == "R" and j["rod"] is None:
+                parts += [dot(axis, at.delta)] + ([] if gives_n else [dot(axis, w)])
+            elif j["joint"] == "F":
+                normal = apply(R, j["normal"]) if on_platform else j["normal"]
+                parts += [dot(axis, at.n), dot(axis, w)] + ([] if gives_n else [dot(normal, w)])
+    for k in range(len(spec["rods"])):
+        carried = [i for i, leg in enumerate(spec["legs"]) if leg["base"]["rod"] == k]
+        frame = rod_frame(spec, k, legs)
+        for i in carried[1:]:
+            at_home = [leg_at(spec, spec["legs"][m], home(spec)) for m in (carried[0], i)]
+            kept = rod_frame(spec, k, {carried[0]: at_home[0]}).x.T @ at_home[1].n.x
+            parts.append(dot(at_home[1].base_axis, cross(apply(frame, kept), legs[i].n)))
+    return concat(parts)
 
 
 def theory_constraints(spec, pose) -> Jet:
-    """The constraints g of the theory page, table T9, for legs with at most one D; else for the whole leg nothing."""
+    """The constraints g of the theory page, table T9, for legs with at most one of kind D."""
     R, o = jet(pose[0]), jet(pose[1])
     parts = []
     for leg in spec["legs"]:
@@ -533,8 +545,10 @@ def characteristic_length(spec) -> float:
     return math.sqrt(np.mean([np.sum(leg["platform"]["point"] ** 2) for leg in spec["legs"]]))
 
 
-# Singular values of the scaled closure gradient below this share of the largest, or of 1 1/m, are zero.
+# Singular values of the scaled closure gradient below this share of the largest, or of 1/m, are zero.
 RANK_TOLERANCE = 1e-7
+# The same while closing: redundant constraints only agree where all are met.
+CLOSING = 1e-4
 
 
 def closure_gradient(spec, pose):
@@ -544,7 +558,7 @@ def closure_gradient(spec, pose):
 
 
 def feasible_directions(spec, pose):
-    """A basis (..., 6, dof) of the twists that keep the joints closed, orthonormal as (v, Λω), and the scale."""
+    """A basis (..., 6, dof) of the twists (v, Λω) that keep the joints closed, orthonormal; and the scale."""
     C, scale = closure_gradient(spec, pose)
     _, s, Vt = np.linalg.svd(C)
     ranks = np.sum(s > RANK_TOLERANCE * np.maximum(s[..., :1], 1), axis=-1)
@@ -563,14 +577,14 @@ def times(A, x):
 
 
 def close(spec, pose, iterations=25):
-    """The poses nearby at which all joints close: Newton's method with the least step, 0.1 m or rad at most."""
+    """The poses nearby at which all joints close: Newton's method with the least step, up to 0.1."""
     R, o = np.array(pose[0], float), np.array(pose[1], float)
     for _ in range(iterations):
         g = residuals(spec, (R, o)).x
-        if np.max(np.abs(g)) < 1e-16:
+        if np.max(np.abs(g)) < 2e-15:
             break
         C, scale = closure_gradient(spec, (R, o))
-        step = -times(np.linalg.pinv(C, rcond=RANK_TOLERANCE), g) / scale
+        step = -times(np.linalg.pinv(C, rcond=CLOSING), g) / scale
         step *= np.minimum(1, 0.1 / np.maximum(np.linalg.norm(step, axis=-1, keepdims=True), 0.1))
         R, o = turn(step[..., 3:]) @ R, o + step[..., :3]
         U, _, Vt = np.linalg.svd(R)
@@ -579,7 +593,7 @@ def close(spec, pose, iterations=25):
 
 
 def feasible_motion(spec, pose, q, q2):
-    """Twist and acceleration (..., 6) that keep the joints closed, from free numbers (..., 6); dof are used."""
+    """Twist and acceleration (..., 6) that keep the joints closed, from free numbers (..., 6)."""
     Z, scale = feasible_directions(spec, pose)
     k = Z.shape[-1]
     twist = times(Z, q[..., :k]) / scale
@@ -589,9 +603,9 @@ def feasible_motion(spec, pose, q, q2):
     return twist, (times(Z, q2[..., :k]) - back) / scale
 
 
-# ---------------------------------------------------------------------------------------------------------------
+# ------------------------------------------------------------------------------------------------------------
 # Forces
-# ---------------------------------------------------------------------------------------------------------------
+# ------------------------------------------------------------------------------------------------------------
 
 
 def load_at(spec, pose, wrench=None, axes="base"):
@@ -608,7 +622,7 @@ def load_at(spec, pose, wrench=None, axes="base"):
 
 
 def link_wrench(link: Link, gravity):
-    """Weight and inertia of a moving link: force at the mass centre, and torque: Newton's and Euler's laws."""
+    """Weight and inertia of a moving link, by Newton and Euler: force at the mass centre, and torque."""
     omega, eps = spin_of(link.frame)
     E = link.frame.x
     inertia = E @ link.body["inertia"] @ np.swapaxes(E, -1, -2)
@@ -618,7 +632,10 @@ def link_wrench(link: Link, gravity):
 
 
 def generalised_force(spec, pose, twist, acceleration, wrench=None, axes="base"):
-    """All given forces' work on the six unit twists (..., 6): what actuators and constraints have to balance."""
+    """All given forces' work on the six unit twists (..., 6), which actuators and constraints balance.
+
+    And the platform's own share: load, weight, inertia and damping, not yet divided by the efficiency.
+    """
     now = links_at(spec, moving(pose, twist, acceleration))
     shifted = links_at(spec, six_directions(pose))
     twist = np.asarray(twist)
@@ -686,9 +703,9 @@ def energy(spec, pose, twist, acceleration):
     return K, P, dK, dP
 
 
-# ---------------------------------------------------------------------------------------------------------------
+# ------------------------------------------------------------------------------------------------------------
 # Mobility
-# ---------------------------------------------------------------------------------------------------------------
+# ------------------------------------------------------------------------------------------------------------
 
 
 @dataclass
@@ -753,9 +770,9 @@ def mobility(spec, pose) -> Mobility:
     return Mobility(links, joints, count, joints - links + 1, rank)
 
 
-# ---------------------------------------------------------------------------------------------------------------
+# ------------------------------------------------------------------------------------------------------------
 # The paper's mechanism: poses by coordinates
-# ---------------------------------------------------------------------------------------------------------------
+# ------------------------------------------------------------------------------------------------------------
 
 S18 = math.sin(math.radians(18))
 E1, E_SMALL = 0.270, 0.150
@@ -778,9 +795,9 @@ def paper_pose(x, y, z, alpha, beta, branch=1):
     return R, o
 
 
-# ---------------------------------------------------------------------------------------------------------------
+# ------------------------------------------------------------------------------------------------------------
 # The paper's equations, as printed. One pose; 3-vectors; names as in the paper.
-# ---------------------------------------------------------------------------------------------------------------
+# ------------------------------------------------------------------------------------------------------------
 
 
 @dataclass
@@ -841,12 +858,12 @@ def eq2(alpha, beta, gamma):
 
 
 def eq4(l, r1, L=LU_L):
-    """(l r1 L), zero where l, r1 and L lie in a plane. The print has lost the determinant's middle columns."""
+    """(l r1 L), zero where l, r1, L lie in a plane. The print has lost the determinant's middle columns."""
     return np.linalg.det(np.array([l, r1, L]))
 
 
 def eq5(Y, Z, alpha):
-    """cos γ."""
+    """The cosine of γ."""
     return (E1 * S18 * cos(alpha) - Z * sin(alpha) - Y * cos(alpha)) / (E_SMALL * S18)
 
 
@@ -857,7 +874,7 @@ def eq6(m: Moving):
 
 
 def eq7(r1, r3, c1, c3, L=LU_L):
-    """k of f_c3 = k f_c1, from the balance of moments about L."""
+    """The ratio k in f_c3 = k f_c1, from the balance of moments about L."""
     return -(np.cross(r1, c1) @ L) / (np.cross(r3, c3) @ L)
 
 
@@ -869,7 +886,7 @@ def eq10(e1, r1, r3, c1, c3, ll, L=LU_L):
 
 
 def eq11(e1, r1, l, L=LU_L):
-    """c and τ."""
+    """The wrench (c, τ)."""
     c = np.cross(L, l)
     return c, np.cross(e1, c) - np.cross(l, np.cross(L, r1))
 
@@ -893,7 +910,7 @@ def eq15(m: Moving):
 
 
 def eq16(e1, r1, l, L=LU_L):
-    """Q and Q1 of c' = -Q ω and τ' = -Qᵀ v + Q1 ω. The last line as printed (the one above it has a slip of sign)."""
+    """Q and Q1 of c' = -Q ω and τ' = -Qᵀ v + Q1 ω: the last line; the one above has a slip of sign."""
     s = skew
     Q = s(L) @ s(l)
     Q1 = s(np.cross(L, l)) @ s(e1) - s(e1) @ s(L) @ s(l) - s(np.cross(L, r1)) @ s(l) + s(l) @ s(L) @ s(e1)
@@ -1107,7 +1124,7 @@ def eq44(r1, r3, c1, f_c, L=LU_L):
 def coupled_forces(e1, e3, r1, r3, l, f_c, L=LU_L):
     """f_c1, f_c3 along c1 = r1×L/|r1×L|, from statics alone: at b1 and b3 they are the wrench f_c (c, τ).
 
-    Six equations for two unknowns; that they hold is what Eq. 7-11 say. Returns the forces and what is left over.
+    Six equations for two unknowns; that they hold is what Eq. 7-11 say. Returns the forces and the rest.
     """
     c1 = np.cross(r1, L) / np.linalg.norm(np.cross(r1, L))
     A = np.array([np.concatenate([c1, np.cross(e, c1)]) for e in (e1, e3)]).T
@@ -1117,7 +1134,7 @@ def coupled_forces(e1, e3, r1, r3, l, f_c, L=LU_L):
 
 
 def coupled_forces_of_the_notes(r1, r3, ll, f_c, L=LU_L):
-    """f_c1, f_c3 from the massless rod's balance about L, and the torque on the rod. ll is the vector b3b1."""
+    """f_c1, f_c3 from the massless rod's balance about L, and the torque on it. ll is the vector b3b1."""
     c1 = np.cross(r1, L) / np.linalg.norm(np.cross(r1, L))
     d1, d3, length = np.cross(r1, L) @ c1, np.cross(r3, L) @ c1, np.linalg.norm(ll)
     return np.array([f_c * d3 / length, -f_c * d1 / length]), f_c * d3 / length * d1

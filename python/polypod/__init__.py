@@ -5,6 +5,9 @@ axes; poses are homogeneous matrices `(..., 4, 4)`; leading axes are a batch. Le
 files and from 0 in arrays.
 """
 
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
 from polypod import errors
 from polypod._core import __version__
 from polypod.errors import (
@@ -13,13 +16,26 @@ from polypod.errors import (
     MotionError,
     PolypodError,
     ShapeError,
+    SolutionError,
     UnknownNameError,
 )
 from polypod.mechanism import Mechanism, list_mechanisms, load
-from polypod.motion import Motion, load_motion
-from polypod.results import Solution, load_solution
-from polypod.solution import solve
 from polypod.status import Status
+
+if TYPE_CHECKING:
+    from polypod.motion import Motion, load_motion
+    from polypod.results import Solution, load_solution
+    from polypod.solution import solve
+
+# Motions and results need scipy and xarray, which take their time to load: only who uses them waits for them.
+_LATER = {
+    "Motion": "motion",
+    "load_motion": "motion",
+    "Solution": "results",
+    "load_solution": "results",
+    "solve": "solution",
+    "plots": "plots",
+}
 
 __all__ = [
     "CoordinateError",
@@ -30,6 +46,7 @@ __all__ = [
     "PolypodError",
     "ShapeError",
     "Solution",
+    "SolutionError",
     "Status",
     "UnknownNameError",
     "__version__",
@@ -40,3 +57,14 @@ __all__ = [
     "load_solution",
     "solve",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _LATER:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    module = import_module(f"{__name__}.{_LATER[name]}")
+    return module if name == _LATER[name] else getattr(module, name)
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *_LATER})

@@ -319,15 +319,16 @@ class Mechanism:
         sigma = self.conditioning(self.home)
         if mobility.uncontrolled:
             notes.append(
-                f"singular by design: with all actuators locked the platform keeps {mobility.uncontrolled} of its "
-                "freedoms at every pose, so that forces and velocities are not determined anywhere."
+                "singular by design: with all actuators locked the platform keeps "
+                f"{mobility.uncontrolled} of its freedoms at every pose, so that forces and velocities are "
+                "not determined anywhere."
             )
         elif not sigma.sigma_min > NEAR_SINGULAR:
             notes.append(
                 "nearly singular at its centre pose: the smallest singular value is "
                 f"{float(sigma.sigma_min):.2g} against {float(sigma.sigma_max):.2g} for the largest. "
-                "The platform can move there with hardly any change of the leg lengths, and forces are large; "
-                "stay clear of it."
+                "The platform can move there with hardly any change of the leg lengths, and forces are "
+                "large; stay clear of it."
             )
         if mobility.redundant:
             legs = " and ".join(mobility.redundant_legs)

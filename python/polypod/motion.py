@@ -274,8 +274,8 @@ def _find(source: str | PathLike[str]) -> Traversable:
 def _sets(mech: HasCoordinateSets | CoordinateSets, names: Iterable[str]) -> CoordinateSets:
     """The coordinate sets to choose from.
 
-    Of the set `pose` those that `names` gives, if they are as many as the mechanism has freedoms: the others are
-    then dependent.
+    Of the set `pose` those that `names` gives, if they are as many as the mechanism has freedoms: the others
+    are then dependent.
     """
     if isinstance(mech, Mapping):
         return mech

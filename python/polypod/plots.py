@@ -1,40 +1,34 @@
 """Figures: the mechanism in space, the curves of the paper's Fig. 4, the topology graph of its Fig. 1b.
 
-Each function draws on the axes or figure that it is given, or makes them with pyplot, and never shows or saves.
+Each function draws on the axes or figure that it is given, or makes them with pyplot; none shows or saves.
 """
 
 from __future__ import annotations
 
-import math
 from collections import defaultdict
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 from matplotlib.patches import FancyBboxPatch
-from matplotlib.patheffects import withStroke
-from mpl_toolkits.mplot3d import Axes3D
-from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+from mpl_toolkits.mplot3d import Axes3D  # type: ignore[import-untyped]
 from numpy.typing import ArrayLike, NDArray
 
 from polypod.errors import PolypodError, ShapeError
 from polypod.mechanism import Mechanism, Mobility
 from polypod.results import Solution
-from polypod.solids import Solids
+from polypod.scene import Scene, draw, frame, joint_handles, math_name
 from polypod.status import Status, count
 from polypod.style import BLUE, GREY, INK, PALE, color_of, dash_of, house_style
+from polypod.summary import link_kind, links_by_joints
 
 Array = NDArray[np.float64]
-
-STEEL, JOINT, BASE, PLATFORM, ROD = "#E8ECF0", "#4A4F57", "#C9CDD3", "#9CC3DF", "#8A6D3B"
-_HALO = [withStroke(linewidth=2.2, foreground="white", alpha=0.85)]
 
 
 def save_figure(figure: Figure, path: str | PathLike[str]) -> None:
@@ -43,7 +37,9 @@ def save_figure(figure: Figure, path: str | PathLike[str]) -> None:
     Raises PolypodError for another suffix.
     """
     path = Path(path)
-    metadata = {".svg": {"Date": None, "Creator": "Polypod"}, ".png": {"Software": "Polypod"}}.get(path.suffix)
+    metadata = {".svg": {"Date": None, "Creator": "Polypod"}, ".png": {"Software": "Polypod"}}.get(
+        path.suffix
+    )
     if metadata is None:
         raise PolypodError(f"{path} ends in {path.suffix!r}; a figure's file ends in .svg or .png")
     with house_style():
@@ -73,10 +69,12 @@ def plot_mechanism(
             ax = _pyplot_figure((5.2, 5.6)).add_subplot(projection="3d")
         if not isinstance(ax, Axes3D):
             raise PolypodError('the mechanism is drawn in space: make the axes with projection="3d"')
-        scene = _Scene(mech, place)
-        _draw(ax, scene, scene.corners(), labels)
+        scene = Scene(mech, place)
+        half = np.ptp(scene.corners(), axis=0) / 2
+        draw(ax, scene, half, frame(ax, scene.corners(), half), labels)
         if labels:
-            _joint_legend(ax, scene.kinds)
+            handles = joint_handles(scene.kinds)
+            ax.legend(handles=handles, loc="upper left", title="Joints", alignment="left")
     return ax
 
 
@@ -95,249 +93,32 @@ def plot_poses(
         figure: to draw on.
         columns: in a row.
     """
-    given = poses if isinstance(poses, Mapping) else dict.fromkeys(())
-    named = dict(given) if given else {str(i): pose for i, pose in enumerate(poses)}  # type: ignore[arg-type]
-    captions = list(named) if given else [""] * len(named)
-    if not named:
+    if isinstance(poses, Mapping):
+        captions, places = [*poses.keys()], [*poses.values()]
+    else:
+        places = [*poses]
+        captions = [""] * len(places)
+    if not places:
         raise ShapeError("poses is empty; needs one pose (4, 4) or more")
-    columns = min(columns, len(named))
-    rows = -(-len(named) // columns)
+    columns = min(columns, len(places))
+    rows = -(-len(places) // columns)
     with house_style():
-        figure = figure or _pyplot_figure((3.1 * columns, 3.9 * rows))
-        scenes = [_Scene(mech, _checked_pose(pose)) for pose in named.values()]
-        corners = np.concatenate([scene.corners() for scene in scenes])
-        for i, (scene, caption) in enumerate(zip(scenes, captions, strict=True)):
-            ax = figure.add_subplot(rows, columns, i + 1, projection="3d")
-            _draw(ax, scene, corners, labels=i == 0)
-            ax.set_title(f"({chr(97 + i)})  {caption}".rstrip(), y=-0.06, loc="center")
-        figure.subplots_adjust(0.0, 0.06, 1.0, 1.0, wspace=0.0, hspace=0.1)
-        _joint_legend(figure.axes[0], scenes[0].kinds)
-    return figure
-
-
-class _JointLabel(NamedTuple):
-    at: Array
-    away: Array
-    """From the middle of the plate."""
-    leg_side: int
-    """+1 where the leg is above the joint, -1 where it is below."""
-    distance: float
-    text: str
-
-    def place(self, right: Array, up: Array) -> Array:
-        """Outwards as seen, but not on the leg, which is above or below."""
-        x, y = float(self.away @ right), float(self.away @ up)
-        if y * self.leg_side > 0.0 or abs(x) > abs(y):
-            x, y = math.copysign(1.0, x), 0.0
-        size = math.hypot(x, y) or 1.0
-        return self.at + self.distance * (x * right + y * up) / size
-
-
-class _Scene:
-    """A mechanism at a pose as solids, and where the labels go."""
-
-    def __init__(self, mech: Mechanism, pose: Array) -> None:
-        spec = mech.geometry
-        self.solids = Solids()
-        self.overlay = Solids()
-        """What is drawn over the bodies even where they hide it."""
-        self.labels: list[tuple[Array, str]] = []
-        self.joint_labels: list[_JointLabel] = []
-        self.kinds: dict[str, None] = {}  # joint kinds in use, in order
-        self._pose, self._rotation = pose, pose[:3, :3]
-        legs = mech.inverse_kinematics(pose)
-        self._size = mech.characteristic_length
-        base = np.array([leg["base"]["point"] for leg in spec["legs"]])
-        platform = base + legs.vectors
-        home_platform = base + mech.inverse_kinematics(mech.home).vectors
-        stroke, home_lengths = mech.stroke, mech.inverse_kinematics(mech.home).lengths
-        up = _plate_normal(base, home_platform.mean(axis=0) - base.mean(axis=0))
-        local = np.array([leg["platform"]["point"] for leg in spec["legs"]])
-        base_at_home = (base.mean(axis=0) - mech.home[:3, 3]) @ mech.home[:3, :3]
-        down = self._rotation @ _plate_normal(local, base_at_home - local.mean(axis=0))
-        radii = [leg["radius"] or 0.085 * self._size for leg in spec["legs"]]
-        thick = max(radii)
-
-        self._plate(base, up, thick, BASE)
-        self._plate(platform, down, thick, PLATFORM)
-        for i, rod in enumerate(spec["rods"]):
-            on = [j for j, leg in enumerate(spec["legs"]) if leg["base"]["rod"] == i]
-            self._rod(rod, base[on], thick)
-        for i, leg in enumerate(spec["legs"]):
-            shortest, name = float(stroke[i, 0]), mech.leg_names[i]
-            body = 0.8 * shortest if shortest > 0 else 0.6 * float(home_lengths[i])
-            self._leg(leg, base[i], platform[i], body, radii[i], color_of(i))
-            rod = leg["base"]["rod"]
-            lower = None if rod is None else np.cross(spec["rods"][rod]["axis"], legs.directions[i])
-            self._joint(leg["base"], np.eye(3), base[i], legs.directions[i], radii[i], up, lower)
-            self._joint(leg["platform"], self._rotation, platform[i], legs.directions[i], radii[i], down, None)
-            for letter, points, leg_side in (("B", base, 1), ("b", platform, -1)):
-                text = f"${letter}_{{{_math(name)}}}$"
-                away = points[i] - points.mean(axis=0)
-                self.joint_labels.append(_JointLabel(points[i], away, leg_side, 4.6 * thick, text))
-        self._triad(self.solids, np.eye(4), "O", "XYZ")
-        self._triad(self.overlay, pose, "o", "xyz")
-
-    def corners(self) -> Array:
-        """(n, 3): all corners of all bodies, m."""
-        return np.concatenate([s.faces().reshape(-1, 3) for s in (self.solids, self.overlay)])
-
-    def _plate(self, points: Array, normal: Array, thick: float, color: str) -> None:
-        """A plate behind the joints, with a post for each of them."""
-        behind = points - 2.0 * thick * normal
-        self.solids.plate(behind, normal, 0.9 * thick, 2.4 * thick, color)
-        height = float(np.min(behind @ normal))
-        for point in points:
-            foot = point - (float(point @ normal) - height) * normal
-            self.solids.tube(foot, point, 1.1 * thick, color, end_radius=0.75 * thick)
-
-    def _rod(self, rod: dict[str, Any], points: Array, thick: float) -> None:
-        axis, start = np.array(rod["axis"]), np.array(rod["point"])
-        axis = axis / np.linalg.norm(axis)
-        along = (points - start) @ axis
-        low, high = start + (along.min() - 3.2 * thick) * axis, start + (along.max() + 3.2 * thick) * axis
-        self.solids.tube(low, high, 0.6 * thick, ROD)
-        for end, inwards in ((low, 1.0), (high, -1.0)):
-            self.solids.tube(end, end + 0.9 * inwards * thick * axis, 1.0 * thick, JOINT)
-        side = start + (0.7 * along.min() + 0.3 * along.max()) * axis
-        self.labels.append((side + np.array([0.0, 0.0, 2.2 * thick]), f"${_math(rod['name'])}$"))
-
-    def _leg(self, leg: dict[str, Any], start: Array, end: Array, body: float, radius: float, color: str) -> None:
-        """Cylinder and piston; a passive leg is pale."""
-        length = float(np.linalg.norm(end - start))
-        direction = (end - start) / length
-        neck, body = min(2.4 * radius, 0.15 * length), min(body, 0.92 * length)
-        at = [start + d * direction for d in (neck, body - 1.5 * radius, body)]
-        self.solids.tube(start, at[0], 0.5 * radius, STEEL)
-        self.solids.tube(at[0], at[1], radius, color if leg["actuated"] else PALE)
-        self.solids.tube(at[1], at[2], 1.18 * radius, JOINT)
-        self.solids.tube(at[2], end, 0.55 * radius, STEEL)
-
-    def _joint(
-        self,
-        joint: dict[str, Any],
-        rotation: Array,
-        at: Array,
-        direction: Array,
-        radius: float,
-        normal: Array,
-        on_rod: Array | None,
-    ) -> None:
-        """`on_rod`: the direction of the axis of a revolute joint on a rod."""
-        kind = joint["joint"]
-        self.kinds[kind] = None
-        axis = None if joint["axis"] is None else rotation @ np.array(joint["axis"])
-        axis = on_rod if on_rod is not None else axis
-        if kind == "S" or axis is None:
-            self.solids.ball(at, 1.45 * radius, JOINT)
-        elif kind == "F":
-            self.solids.block(at, normal, 2.4 * radius, JOINT)
-        else:
-            self._pin(at, axis, 2.0 * radius, 0.75 * radius)
-            if kind == "U":
-                self._pin(at, np.cross(axis, direction), 2.0 * radius, 0.75 * radius)
-
-    def _pin(self, at: Array, axis: Array, half: float, radius: float) -> None:
-        step = axis * (half / np.linalg.norm(axis))
-        self.solids.tube(at - step, at + step, radius, JOINT)
-
-    def _triad(self, solids: Solids, pose: Array, origin: str, names: str) -> None:
-        size = 0.66 * self._size
-        start = pose[:3, 3]
-        for column, name in enumerate(names):
-            tip, neck = (start + part * size * pose[:3, column] for part in (1.0, 0.78))
-            solids.tube(start, neck, 0.018 * self._size, INK, sides=10)
-            solids.tube(neck, tip, 0.055 * self._size, INK, end_radius=0.0)
-            self.labels.append((start + 1.17 * (tip - start), f"${name}$"))
-        self.labels.append((start - 0.16 * size * pose[:3, :3].sum(axis=1), f"${origin}$"))
-
-
-def _draw(ax: Axes3D, scene: _Scene, corners: Array, labels: bool) -> None:
-    """A scene in a frame that shows all `corners`."""
-    ax.computed_zorder = False
-    for solids, zorder in ((scene.solids, 1.0), (scene.overlay, 2.0)):
-        shades = solids.shades()
-        # Edges of the same colour close the seams; as a picture inside the SVG the many faces stay small.
-        faces = Poly3DCollection(
-            solids.faces(), facecolors=shades, edgecolors=shades, linewidths=0.25, rasterized=True
+        figure = figure or _pyplot_figure((3.2 * columns, 3.5 * rows))
+        scenes = [Scene(mech, _checked_pose(pose)) for pose in places]
+        half = np.max([np.ptp(scene.corners(), axis=0) / 2 for scene in scenes], axis=0)
+        cells = figure.add_gridspec(
+            rows, columns, left=0.0, right=1.0, bottom=0.11, top=1.0, wspace=0.0, hspace=0.12
         )
-        faces.set(zorder=zorder, clip_on=False)
-        ax.add_collection3d(faces, autolim=False)
-    right, up = _frame(ax, corners)
-    ax.set_axis_off()
-    if labels:
-        places = [*scene.labels, *((label.place(right, up), label.text) for label in scene.joint_labels)]
-        for at, text in places:
-            ax.text(*at, text, ha="center", va="center", fontsize=8.5, path_effects=_HALO, zorder=10)
-
-
-def _frame(ax: Axes3D, corners: Array) -> tuple[Array, Array]:
-    """The view, the same scale along all axes, and limits that fill the axes with the corners.
-
-    Returns the directions that are to the right and up in the picture.
-    """
-    elevation, azimuth = math.radians(_ELEVATION), math.radians(_AZIMUTH)
-    (se, ce), (sa, ca) = ((math.sin(a), math.cos(a)) for a in (elevation, azimuth))
-    right, up = np.array([-sa, ca, 0.0]), np.array([-se * ca, -se * sa, ce])
-    ax.set_proj_type("persp", focal_length=1.6)
-    ax.view_init(elev=_ELEVATION, azim=_AZIMUTH)
-    low, high = corners.min(axis=0), corners.max(axis=0)
-    half, center, zoom = (high - low) / 2, (high + low) / 2, 1.0
-    cell = ax.get_position(original=True).size * ax.get_figure(root=True).get_size_inches()
-    for _ in range(4):  # perspective: each step is a little off
-        for i, name in enumerate("xyz"):
-            getattr(ax, f"set_{name}lim")(center[i] - half[i], center[i] + half[i])
-        ax.set_box_aspect(tuple(half), zoom=zoom)
-        seen = _seen(ax, np.vstack([corners, center, center + right]))
-        middle, unit = seen[-2], float(seen[-1, 0] - seen[-2, 0])
-        first, last = seen[:-2].min(axis=0), seen[:-2].max(axis=0)
-        shift = (first + last) / 2 - middle
-        center = center + (shift[0] * right + shift[1] * up) / unit
-        # The axes are the largest square in their cell; their limits are those of the projection.
-        window = np.diff(ax.transLimits.inverted().transform([(0, 0), (1, 1)]), axis=0)[0]
-        zoom *= _FILL * float(np.min(window * cell / min(cell) / (last - first)))
-    return right, up
-
-
-_ELEVATION, _AZIMUTH = 17.0, -68.0
-_FILL = 0.86
-
-
-def _seen(ax: Axes3D, points: Array) -> Array:
-    """(n, 2): points as the axes project them."""
-    flat = np.hstack([points, np.ones((len(points), 1))]) @ ax.get_proj().T
-    seen: Array = flat[:, :2] / flat[:, 3:]
-    return seen
-
-
-_JOINTS = {
-    "S": ("o", 6.0, "S  spherical"),
-    "U": ("P", 7.5, "U  universal"),
-    "R": ("$\u25ac$", 8.0, "R  revolute"),
-    "F": ("s", 5.5, "F  fixed"),
-}
-
-
-def _joint_legend(ax: Axes, kinds: Iterable[str]) -> None:
-    handles = [
-        Line2D([], [], linestyle="none", color=JOINT, marker=marker, markersize=size, label=text)
-        for kind, (marker, size, text) in _JOINTS.items()
-        if kind in set(kinds)
-    ]
-    ax.legend(handles=handles, loc="upper left", handlelength=1.0, title="Joints", alignment="left")
-
-
-def _plate_normal(points: Array, towards: Array) -> Array:
-    """Unit normal of the plane through points as well as can be, on the side of `towards`."""
-    _, sizes, axes = np.linalg.svd(points - points.mean(axis=0))
-    flat = len(sizes) > 1 and sizes[1] > 1e-9 * max(sizes[0], 1e-300)
-    if flat:
-        normal = axes[2]
-    else:  # joints on one line, or in one point
-        along = axes[0] if sizes[0] > 0 else np.zeros(3)
-        normal = towards - (towards @ along) * along
-        normal = normal / np.linalg.norm(normal)
-    return normal if normal @ towards >= 0 else -normal
+        spaces = [figure.add_subplot(cells[i], projection="3d") for i in range(len(scenes))]
+        views = list(zip(spaces, scenes, captions, strict=True))
+        zoom = min(frame(ax, scene.corners(), half) for ax, scene, _ in views)
+        for i, (ax, scene, caption) in enumerate(views):
+            draw(ax, scene, half, zoom, labels=i == 0)
+            cell = ax.get_position(original=True)
+            text = f"({chr(97 + i)})  {caption}".rstrip()
+            figure.text(cell.x0 + cell.width / 2, cell.y0, text, ha="center", va="top")
+        figure.legend(handles=joint_handles(scenes[0].kinds), loc="lower center", ncols=4)
+    return figure
 
 
 def _checked_pose(pose: ArrayLike) -> Array:
@@ -347,12 +128,6 @@ def _checked_pose(pose: ArrayLike) -> Array:
     if not np.isfinite(array).all():
         raise ShapeError("pose holds NaN or infinity: there is nothing to draw")
     return array
-
-
-def _math(name: str) -> str:
-    """A leg's name inside a formula; words stand upright."""
-    safe = "".join(c if c.isalnum() or c in " -." else "\\_" if c == "_" else "" for c in name)
-    return safe if len(safe) == 1 else rf"\mathrm{{{safe}}}".replace(" ", r"\ ")
 
 
 def _pyplot_figure(size: tuple[float, float], **more: Any) -> Figure:
@@ -386,8 +161,11 @@ def plot_fig4(solution: Solution, figure: Figure | None = None) -> Figure:
     """The twelve panels of the paper's Fig. 4: motion of the platform (a-f), legs (g-i), forces (j-l).
 
     Lengths are in mm and angles in degrees, everything else is SI. Spans of time with a status other than OK
-    are grey. Where a mechanism has no couple-constrained forces, panels (k) and (l) show its constraint multipliers
-    or actuator power, and the smallest singular value.
+    are grey. Where a mechanism has no couple-constrained forces, panels (k) and (l) show its constraint
+    multipliers or actuator power, and the smallest singular value.
+
+    The couples in the platform joints of legs on one rod are statically indeterminate; (k) and (l) take them
+    as zero.
     """
     data = solution.dataset
     panels = [panel for panel in _panels(data) if panel is not None]
@@ -395,15 +173,23 @@ def plot_fig4(solution: Solution, figure: Figure | None = None) -> Figure:
     rows = -(-len(panels) // columns)
     with house_style():
         figure = figure or _pyplot_figure((10.0, 2.55 * rows + 0.3))
-        figure.set_layout_engine("constrained", w_pad=0.06, h_pad=0.05, wspace=0.02, hspace=0.02)
+        figure.set_layout_engine("none")
+        width, height = figure.get_size_inches()
         grid = figure.subplots(rows, columns, sharex=True, squeeze=False)
+        # Margins in inches: the same at any size, and much faster than a layout engine.
+        figure.subplots_adjust(
+            left=0.68 / width, right=1 - 0.12 / width, bottom=0.55 / height, top=1 - 0.3 / height
+        )
+        figure.subplots_adjust(wspace=0.3, hspace=0.2)
         time = data["time"].to_numpy()
         lost = (data["status"] != Status.OK).to_numpy()
         for i, (ax, panel) in enumerate(zip(grid.flat, panels, strict=False)):
             _draw_panel(ax, panel, time, lost)
             ax.text(-0.02, 1.04, f"({chr(97 + i)})", transform=ax.transAxes, ha="right", va="bottom")
         if lost.any():
-            reasons = (f"{Status(code).name.lower().replace('_', ' ')}" for code, _, _ in count(data["status"]))
+            reasons = (
+                f"{Status(code).name.lower().replace('_', ' ')}" for code, _, _ in count(data["status"])
+            )
             figure.supxlabel(f"grey: {', '.join(reasons)}", fontsize=8)
         for ax in grid.flat[len(panels) :]:
             ax.remove()
@@ -426,8 +212,15 @@ def _draw_panel(ax: Axes, panel: _Panel, time: Array, lost: NDArray[np.bool_]) -
     finite = panel.values[np.isfinite(panel.values)]
     if finite.size == 0 or np.ptp(finite) == 0.0:
         ax.margins(y=0.5)
-    ax.ticklabel_format(axis="y", style="sci", scilimits=(-3, 5), useMathText=True)
-    ax.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=max(len(panel.curves), 1))
+    ax.ticklabel_format(axis="y", style="sci", scilimits=(-3, 5))
+    many = len(panel.curves) > 5
+    ax.legend(
+        loc="lower left",
+        bbox_to_anchor=(0.0, 1.0),
+        ncols=-(-len(panel.curves) // 2) if len(panel.curves) > 7 else max(len(panel.curves), 1),
+        handlelength=0.9 if many else None,
+        columnspacing=0.6 if many else None,
+    )
 
 
 def _spans(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
@@ -437,7 +230,7 @@ def _spans(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
 
 
 def _panels(data: xr.Dataset) -> list[_Panel | None]:
-    legs = [_math(str(name)) for name in data["leg"].to_numpy()]
+    legs = [math_name(str(name)) for name in data["leg"].to_numpy()]
 
     def six(name: str, part: int, label: str, symbol: str, unit: str, scale: float = 1.0) -> _Panel:
         values = scale * data[name].to_numpy()[:, 3 * part : 3 * part + 3]
@@ -494,19 +287,21 @@ def _orientation(data: xr.Dataset) -> _Panel | None:
 def _subscripted(name: str) -> str:
     """A coordinate such as rx or axis_x as a formula."""
     stem, index = name.rstrip("xyz").rstrip("_"), name[-1]
-    return f"${stem}$" if name[-1] not in "xyz" else f"${_math(stem)}_{index}$"
+    return f"${stem}$" if name[-1] not in "xyz" else f"${math_name(stem)}_{index}$"
 
 
 def _second_forces(data: xr.Dataset) -> _Panel:
     """Couple-constrained forces, else constraint multipliers, else what the actuators give."""
     if "coupled_force" in data:
-        curves = tuple(f"$f_{{c{_math(str(leg))}}}$" for leg in data["coupled_leg"].to_numpy())
+        curves = tuple(f"$f_{{c{math_name(str(leg))}}}$" for leg in data["coupled_leg"].to_numpy())
         return _in_kilo(_Panel("coupled force $f_c$", "N", data["coupled_force"].to_numpy(), curves))
     if "constraint" in data:
         values = data["constraint"].to_numpy()
         curves = tuple(f"$f_{{c,{i + 1}}}$" for i in range(values.shape[1]))
-        unit = data["constraint"].attrs["units"].replace("N or N m", "N or N m")
-        return _Panel("constraint $f_c$", unit, values, curves)
+        # Kind A-E stands first; D keeps the angle between two directions, E compares two legs' moments.
+        kinds = [str(row)[0] for row in data["constraint_row"].to_numpy()]
+        units = {{"D": "N m", "E": "N m$^{-1}$"}.get(kind, "N") for kind in kinds}
+        return _Panel("constraint $f_c$", " or ".join(sorted(units)), values, curves)
     return _in_kilo(_Panel("actuator power", "W", data["actuator_power"].to_numpy()[:, None], ("$P$",)))
 
 
@@ -529,30 +324,7 @@ def _in_kilo(panel: _Panel) -> _Panel:
 
 # --- the topology graph of Fig. 1b --------------------------------------------------------------------------
 
-_BY_JOINTS = {
-    1: "singular",
-    2: "binary",
-    3: "ternary",
-    4: "quaternary",
-    5: "pentagonal",
-    6: "hexagonal",
-    7: "heptagonal",
-    8: "octagonal",
-}
 _HUBS = (0, 1)  # base and platform come first among the links
-
-
-def link_kind(joints: int) -> str:
-    """The name of a link by its number of joints: binary, ternary, ..."""
-    return _BY_JOINTS.get(joints, f"{joints}-joint")
-
-
-def links_by_joints(mobility: Mobility) -> dict[str, tuple[str, ...]]:
-    """Names of the links, grouped by the kind of `link_kind`, those with most joints first."""
-    groups: defaultdict[int, list[str]] = defaultdict(list)
-    for link in mobility.graph_links:
-        groups[len(link.joints)].append(link.name)
-    return {link_kind(n): tuple(groups[n]) for n in sorted(groups, reverse=True)}
 
 
 def plot_topology(mobility: Mobility, ax: Axes | None = None) -> Axes:
@@ -636,5 +408,5 @@ def _draw_link(ax: Axes, name: str, joints: int, x: float, y: float, half: float
         zorder=3,
     )
     ax.add_patch(box)
-    text = f"{name}  ({link_kind(joints)})" if wide else name
+    text = f"{name}  ({link_kind(joints)})" if wide else name.replace(" ", "\n", len(name) > 14)
     ax.text(x, y, text, ha="center", va="center_baseline", fontsize=8 if wide else 7, zorder=4)

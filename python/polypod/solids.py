@@ -31,7 +31,8 @@ class Solids:
         diffuse = 0.58 + 0.42 * (0.5 + 0.5 * towards)
         gloss = 0.32 * np.clip(towards, 0.0, 1.0) ** 12
         shaded = colors * diffuse[:, None]
-        return np.clip(shaded + (1.0 - shaded) * gloss[:, None], 0.0, 1.0)
+        lit: Array = np.clip(shaded + (1.0 - shaded) * gloss[:, None], 0.0, 1.0)
+        return lit
 
     def tube(
         self,
@@ -41,7 +42,7 @@ class Solids:
         color: str,
         *,
         end_radius: float | None = None,
-        sides: int = 28,
+        sides: int = 20,
     ) -> None:
         """A round bar with flat ends, or a cone."""
         start, end = np.asarray(start, float), np.asarray(end, float)
@@ -50,7 +51,7 @@ class Solids:
             return
         last = radius if end_radius is None else end_radius
         # Faces about as long as wide: long ones would be hidden or shown as a whole.
-        pieces = int(np.clip(length / (3.0 * max(radius, last)), 1, 40))
+        pieces = int(np.clip(length / (4.0 * max(radius, last)), 1, 30))
         axis = (end - start) / length
         x, y = _across(axis)
         turn = np.linspace(0.0, 2.0 * np.pi, sides + 1)
@@ -64,7 +65,7 @@ class Solids:
 
     def ball(self, center: ArrayLike, radius: float, color: str) -> None:
         """A sphere."""
-        turn, height = np.linspace(0, 2 * np.pi, 29)[None, :], np.linspace(0, np.pi, 15)[:, None]
+        turn, height = np.linspace(0, 2 * np.pi, 21)[None, :], np.linspace(0, np.pi, 11)[:, None]
         x, y = np.sin(height) * np.cos(turn), np.sin(height) * np.sin(turn)
         z = np.cos(height) * np.ones_like(turn)
         center = np.asarray(center, float)
@@ -72,11 +73,17 @@ class Solids:
 
     def block(self, center: ArrayLike, axis: ArrayLike, size: float, color: str) -> None:
         """A cube with one edge along `axis`."""
-        axis = np.asarray(axis, float) * size / 2
-        self.tube(center - axis, np.asarray(center) + axis, size / np.sqrt(2), color, sides=4)
+        center, axis = np.asarray(center, float), np.asarray(axis, float) * size / 2
+        self.tube(center - axis, center + axis, size / np.sqrt(2), color, sides=4)
 
-    def plate(self, points: Array, normal: Array, thickness: float, margin: float, color: str) -> None:
-        """A flat plate with round corners under (k, 3) points; `normal` points from it to them."""
+    def plate(
+        self, points: Array, normal: Array, thickness: float, margin: float, color: str, viewer: Array
+    ) -> None:
+        """A flat plate with round corners under (k, 3) points; `normal` points from it to them.
+
+        Of its two sides only the one on the side of the direction `viewer` has faces: both are too near one
+        another, for their size, to be sorted.
+        """
         x, y = _across(normal)
         height = float(np.min(points @ normal))
         flat = points @ np.stack([x, y], axis=-1)
@@ -94,7 +101,7 @@ class Solids:
         top = disc[..., :1] * x + disc[..., 1:] * y + height * normal
         bottom = top - thickness * normal
         inside = (top[0, 0] + bottom[0, 0]) / 2
-        for grid in (top, bottom, np.stack([bottom[-1], top[-1]])):
+        for grid in (top if normal @ viewer > 0 else bottom, np.stack([bottom[-1], top[-1]])):
             self._grid(grid, inside, color)
 
     def _grid(self, corners: Array, inside: Array, color: str) -> None:

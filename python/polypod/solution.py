@@ -58,7 +58,7 @@ VARIABLES: dict[str, tuple[tuple[str, ...], str, str, str]] = {
     "rod_eps": (_ROD3, "rad/s^2", "ε_L", "angular acceleration of the rod"),
     "wrench": (_SIX, "N and N m", "(F_o, T_o)", "load on the platform at o, in its own axes"),
     "force": (_LEG, "N", "f_a", "active force of the leg"),
-    "constraint": (("time", "constraint_row"), "N or N m", "f_c", "multiplier of the constraint"),
+    "constraint": (("time", "constraint_row"), "N, N m or N/m", "f_c", "multiplier of the constraint"),
     "coupled_force": (("time", "coupled_leg"), "N", "f_c1, f_c3", "couple-constrained force"),
     "coupled_torque": (_TIME, "N m", "T_c", "couple-constrained torque on the rod"),
     "coupled_force_as_printed": (("time", "coupled_leg"), "N", "f_c1, f_c3", "the same, Eq. 44 as printed"),

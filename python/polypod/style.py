@@ -19,7 +19,7 @@ INK, GREY, PALE = "#262626", "#7A7A7A", "#E4E6E9"
 # In this order they stay distinct in black and white, too.
 DASHES = ("-", (0, (5, 1.5)), (0, (1.2, 1.2)), (0, (6, 1.5, 1.2, 1.5)), (0, (3, 1.2)))
 
-_RC: dict[str, Any] = {
+_RC: Any = {  # no type: matplotlib's own names every setting there is
     "font.family": "DejaVu Sans",  # comes with matplotlib: figures are the same on every machine
     "font.size": 8,
     "text.color": INK,

@@ -23,9 +23,14 @@ CONDITIONS = {
     "B": "r stays at right angles to an axis of the base",
     "C": "r stays at right angles to an axis of the platform",
     "D": "an axis of the platform stays at right angles to one of the base",
+    "E": "keeps its angle about the rod to the first leg on it",
 }
 """What the constraints of theory [T9] demand, by kind."""
 
+_MOBILITY = (
+    *("dof", "links", "joints", "joint_freedoms", "loops", "closure_rank"),
+    *("redundant", "redundant_legs", "passive", "passive_legs"),
+)
 _BY_JOINTS = {2: "binary", 3: "ternary", 4: "quaternary", 5: "pentagonal", 6: "hexagonal"}
 
 
@@ -50,8 +55,6 @@ def describe(mech: Mechanism) -> dict[str, Any]:
     mobility, file = mech.mobility(), mech.to_dict()
     centre = mech.conditioning(mech.home)
     legs = zip(mech.leg_names, mech.leg_letters, mech.actuated, mech.stroke, strict=True)
-    terms = ("dof", "links", "joints", "joint_freedoms", "loops", "closure_rank")
-    terms += ("redundant", "redundant_legs", "passive", "passive_legs")
     return {
         "name": mech.name,
         "description": file.get("description", ""),
@@ -61,14 +64,14 @@ def describe(mech: Mechanism) -> dict[str, Any]:
             {"name": name, "joints": letters, "actuated": bool(actuated), "stroke": _numbers(stroke)}
             for name, letters, actuated, stroke in legs
         ],
-        "mobility": {term: getattr(mobility, term) for term in terms},
+        "mobility": {term: getattr(mobility, term) for term in _MOBILITY},
         "accounting": accounting(mobility),
         "links_by_joints": links_by_joints(mobility),
         "constraints": [
             {
                 "leg": leg,
                 "kind": kind,
-                "condition": CONDITIONS[kind],
+                "condition": CONDITIONS.get(kind, ""),
                 "independent": i in mobility.independent_rows,
             }
             for i, (leg, kind) in enumerate(mobility.constraint_rows)
@@ -86,7 +89,7 @@ def describe(mech: Mechanism) -> dict[str, Any]:
 
 
 def accounting(mobility: Mobility) -> dict[str, Any]:
-    """The terms of Eq. 1 from ranks, beside those that the mechanism's publication gives, and what to think of it."""
+    """The terms of Eq. 1 from ranks, beside those that the mechanism's publication gives, with a remark."""
     m, p = mobility, mobility.published
     common = 6 * (m.links - m.joints - 1) + m.joint_freedoms
 
@@ -169,7 +172,7 @@ def summarise(mech: Mechanism, solution: Solution) -> dict[str, Any]:
 
 
 def _power(solution: Solution) -> dict[str, float | None]:
-    """The greatest actuator power, the greatest residual, and the residual as a part of all powers that flow."""
+    """The greatest actuator power and residual, and the residual as a part of the power that flows."""
     data = solution.dataset
     names = ("actuator_power", "load_power", "damping_power", "friction_power")
     flows = np.sum([np.abs(data[name].to_numpy()) for name in names], axis=0)
@@ -198,6 +201,7 @@ def _coupled(solution: Solution) -> dict[str, Any] | None:
         "peak_torque": _peak(data["coupled_torque"].to_numpy()),
         "peak_torque_as_printed": _peak(data["coupled_torque_as_printed"].to_numpy()),
         "consistent_over_printed": [_reciprocal(_greatest(ratio)), _reciprocal(_least(ratio))],
+        "note": "the couples in the joints of these legs are statically indeterminate and taken as zero",
         "share_of_active": largest / active if largest is not None and active else None,
     }
 

@@ -1,0 +1,369 @@
+"""The command line. Each command is a thin layer over the functions that Python users call.
+
+Exit status: 0 done, 1 done but some states have no answer, 2 wrong input.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from polypod.errors import PolypodError
+
+# Commands import the rest where they need it, so that help comes at once.
+if TYPE_CHECKING:
+    from polypod.mechanism import Mechanism
+    from polypod.motion import Motion
+    from polypod.results import Solution
+
+app = typer.Typer(
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode="rich",
+    epilog="Start with: [bold]polypod demo[/bold]",
+)
+
+RESULT_SUFFIXES = (".nc", ".csv")
+
+
+def main() -> None:
+    """Runs the command line; whatever is wrong with the input becomes one message and exit status 2."""
+    try:
+        app()
+    except (PolypodError, OSError) as error:
+        print(f"polypod: {_readable(error)}", file=sys.stderr)
+        sys.exit(2)
+
+
+def _readable(error: Exception) -> str:
+    if isinstance(error, OSError) and error.strerror:
+        return f"{error.filename}: {error.strerror}" if error.filename else error.strerror
+    return str(error)
+
+
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        from polypod import __version__
+
+        print(f"polypod {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _polypod(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version.")
+    ] = False,
+) -> None:
+    """Kinematics and dynamics of parallel manipulators on telescopic legs."""
+
+
+MechanismArgument = Annotated[
+    str, typer.Argument(metavar="MECHANISM", help="A mechanism file (.toml) or a built-in mechanism's name.")
+]
+JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON instead of tables: SI units, radians.")]
+
+
+# --- demo ---------------------------------------------------------------------------------------------------
+
+
+@app.command(epilog="Example: [bold]polypod demo -o demo[/bold]")
+def demo(
+    directory: Annotated[
+        Path,
+        typer.Option("-o", "--output", metavar="DIR", help="Directory for the results; made if need be."),
+    ] = Path("polypod-demo"),
+) -> None:
+    """Solve the published manipulator along the built-in motion: tables, figures and a summary in DIR."""
+    from rich.markdown import Markdown
+
+    from polypod.demo import run_demo
+
+    with _working("solving and drawing"):
+        result = run_demo(directory)
+    _console().print(Markdown(result.text))
+
+
+# --- info ---------------------------------------------------------------------------------------------------
+
+
+@app.command(epilog="Example: [bold]polypod info lu-3spu-2rpu-r[/bold]")
+def info(mechanism: MechanismArgument, as_json: JsonOption = False) -> None:
+    """Tell what a mechanism is: freedoms, joints, constraints, coordinates, conditioning, warnings."""
+    from polypod.mechanism import load
+    from polypod.summary import describe
+
+    facts = describe(load(mechanism))
+    if as_json:
+        _print_json(facts)
+    else:
+        _print_mechanism(_console(), facts)
+
+
+def _print_mechanism(out: Console, facts: dict[str, Any]) -> None:
+    mobility, accounting = facts["mobility"], facts["accounting"]
+    out.print(f"[bold]{escape(facts['name'])}[/bold]  {escape(facts['description'])}")
+    if facts["source"]:
+        out.print(f"[dim]{escape(facts['source'])}[/dim]")
+
+    legs = _table("Legs", "leg", "joints", "actuated", "stroke / mm>")
+    for leg in facts["legs"]:
+        legs.add_row(
+            escape(leg["name"]), leg["joints"], "yes" if leg["actuated"] else "no", _range_mm(leg["stroke"])
+        )
+    out.print(legs)
+
+    table = _table("Mobility, from ranks at generic poses", "", ">", "")
+    for term, key, remark in (
+        ("freedoms of the platform", "dof", ""),
+        ("links, with the base", "links", ""),
+        ("joints", "joints", ""),
+        ("joint freedoms", "joint_freedoms", ""),
+        ("independent loops", "loops", f"{6 * mobility['loops']} closure equations"),
+        ("rank of the loop closures", "closure_rank", ""),
+        ("redundant constraints", "redundant", _of_legs("couple", mobility["redundant_legs"])),
+        ("passive freedoms", "passive", _of_legs("spin of", mobility["passive_legs"])),
+    ):
+        table.add_row(term, str(mobility[key]), remark)
+    out.print(table)
+
+    columns = {"from ranks": accounting["computed"], "published": accounting["published"]}
+    columns = {name: terms for name, terms in columns.items() if terms}
+    eq1 = _table("Eq. 1:  M = 6 (n_0 - n_k - 1) + ΣM_i + ς - M_0", "", *(f"{name}>" for name in columns))
+    for term, text in (
+        ("6 (n_0 - n_k - 1)", str(6 * (mobility["links"] - mobility["joints"] - 1))),
+        ("ΣM_i", str(mobility["joint_freedoms"])),
+    ):
+        eq1.add_row(term, *(text for _ in columns))
+    for term, key in (("ς", "redundant"), ("M_0", "passive"), ("M", "sum")):
+        eq1.add_row(term, *(str(terms[key]) for terms in columns.values()))
+    out.print(eq1)
+    if accounting["note"]:
+        out.print(f"{accounting['note'][0].upper()}{accounting['note'][1:]}.")
+
+    topology = _table("Links by number of joints", "kind", "number>", "links")
+    for kind, names in facts["links_by_joints"].items():
+        topology.add_row(kind, str(len(names)), escape(", ".join(names)))
+    out.print(topology)
+
+    if facts["constraints"]:
+        constraints = _table("Constraints on the platform", "leg", "kind", "condition", "independent")
+        for row in facts["constraints"]:
+            constraints.add_row(
+                escape(row["leg"]), row["kind"], row["condition"], "yes" if row["independent"] else "no"
+            )
+        out.print(constraints)
+
+    sets = _table("Coordinate sets", "set", "coordinates")
+    for name, coordinates in facts["coordinate_sets"].items():
+        of = f"any {mobility['dof']} of " if name == "pose" and len(coordinates) > mobility["dof"] else ""
+        sets.add_row(name, of + ", ".join(coordinates))
+    out.print(sets)
+
+    centre = facts["centre_pose"]
+    table = _table("At the centre pose", "", ">")
+    table.add_row("position of o / mm", ", ".join(f"{1e3 * row[3]:.1f}" for row in centre["pose"][:3]))
+    for key in ("sigma_min", "sigma_max", "condition"):
+        table.add_row(_CONDITIONING[key], _g(centre[key]))
+    table.add_row("characteristic length / mm", f"{1e3 * facts['characteristic_length']:.1f}")
+    out.print(table)
+    for warning in facts["warnings"]:
+        out.print(f"[bold yellow]Warning:[/bold yellow] {escape(warning)}")
+
+
+_CONDITIONING = {
+    "sigma_min": "smallest singular value of the leg Jacobian",
+    "sigma_max": "largest singular value",
+    "condition": "condition number",
+}
+
+
+def _of_legs(what: str, names: tuple[str, ...]) -> str:
+    if not names:
+        return ""
+    return escape(f"{what} leg{'s' if len(names) > 1 else ''} {', '.join(names)}")
+
+
+# --- solve --------------------------------------------------------------------------------------------------
+
+
+@app.command(epilog="Example: [bold]polypod solve lu-3spu-2rpu-r lu-3spu-2rpu-r -o result.nc[/bold]")
+def solve(
+    mechanism: MechanismArgument,
+    motion: Annotated[
+        str,
+        typer.Argument(metavar="MOTION", help="A motion file (.csv or .toml) or a built-in motion's name."),
+    ],
+    result: Annotated[
+        Path,
+        typer.Option(
+            "-o", "--output", metavar="RESULT", help="File for the results: .nc or .csv; it is overwritten."
+        ),
+    ],
+    as_json: JsonOption = False,
+) -> None:
+    """Solve a mechanism along a motion: kinematics, forces, power and conditioning, saved in RESULT.
+
+    The exit status is 1 if some states have no answer.
+    """
+    from polypod.mechanism import load
+    from polypod.motion import load_motion
+    from polypod.summary import summarise
+
+    _check_result_path(result)
+    mech = load(mechanism)
+    solution = _solve_with_progress(mech, load_motion(motion, mech))
+    solution.save(result)
+    facts = summarise(mech, solution)
+    if as_json:
+        _print_json({**facts, "result": str(result)})
+    else:
+        _print_solution(_console(), facts)
+        _console().print(f"Written: {escape(str(result))}", highlight=False, soft_wrap=True)
+    if facts["without_answer"]:
+        raise typer.Exit(1)
+
+
+def _check_result_path(path: Path) -> None:
+    """Before any work: what would fail after it."""
+    from polypod.errors import SolutionError
+
+    if path.suffix not in RESULT_SUFFIXES:
+        raise SolutionError(f"{path} ends in {path.suffix!r}; a result's file ends in .nc or .csv")
+    if path.is_dir():
+        raise SolutionError(f"{path} is a directory; the result needs a file")
+    if not path.parent.is_dir():
+        raise SolutionError(
+            f"{path.parent} is no directory; make it first, or choose another place for the result"
+        )
+
+
+def _solve_with_progress(mech: Mechanism, motion: Motion) -> Solution:
+    """Solves, with a bar on the terminal when there is more than a moment's work."""
+    from polypod.solution import CHUNK
+    from polypod.solution import solve as solve_motion
+
+    if len(motion.time) <= CHUNK:
+        return solve_motion(mech, motion)
+    with _bar("solving", len(motion.time)) as progress:
+        return solve_motion(mech, motion, progress=progress)
+
+
+def _print_solution(out: Console, facts: dict[str, Any]) -> None:
+    out.print(
+        f"[bold]{escape(facts['mechanism'])}[/bold] along [bold]{escape(facts['motion'])}[/bold] "
+        f"({escape(facts['coordinate_set'])} coordinates): {facts['states']} states "
+        f"from {facts['start']:g} s to {facts['end']:g} s",
+        highlight=False,
+    )
+    legs = _table("Legs", "leg", "length / mm>", "stroke / mm>", "peak speed / mm/s>", "peak force / N>")
+    for leg in facts["legs"]:
+        peaks = (_f(leg["peak_rate"], 1e3), _f(leg["peak_force"]))
+        legs.add_row(escape(leg["name"]), _range_mm(leg["length"]), _range_mm(leg["stroke"]), *peaks)
+    out.print(legs)
+
+    whole = _table("Along the motion", "", ">")
+    platform, power = facts["platform"], facts["power"]
+    whole.add_row("peak speed of o / mm/s", _f(platform["peak_speed"], 1e3))
+    whole.add_row("peak angular speed / rad/s", _g(platform["peak_angular_speed"]))
+    whole.add_row("peak actuator power / W", _f(power["peak_actuators"]))
+    whole.add_row("residual of the power balance / W", _g(power["greatest_residual"], 1))
+    whole.add_row("... relative to the power that flows", _g(power["relative_residual"], 1))
+    if coupled := facts["coupled"]:
+        names = ", ".join(f"f_c{leg}" for leg in coupled["legs"])
+        whole.add_row(
+            escape(f"peak couple-constrained forces {names} / N"), ", ".join(map(_f, coupled["peak_forces"]))
+        )
+        whole.add_row("peak couple-constrained torque T_c / N m", _f(coupled["peak_torque"]))
+    if nearest := facts["nearest_to_singular"]:
+        whole.add_row("nearest to singular: time / s", f"{nearest['time']:g}")
+        whole.add_row("... smallest singular value", _g(nearest["sigma_min"]))
+        whole.add_row("... condition number", _g(nearest["condition"]))
+    out.print(whole)
+    if coupled:
+        out.print(f"Note: {coupled['note']}.")
+
+    if facts["outcomes"]:
+        outcomes = _table("Outcomes other than OK", "status", "states>", "first at / s>", "meaning")
+        for row in facts["outcomes"]:
+            outcomes.add_row(
+                row["status"], str(row["count"]), f"{row['first_time']:g}", escape(row["message"])
+            )
+        out.print(outcomes)
+    else:
+        out.print("All states have an answer, inside the strokes.")
+
+
+# --- printing -----------------------------------------------------------------------------------------------
+
+
+def _console() -> Console:
+    return Console(highlight=False)
+
+
+def _table(title: str, *headers: str) -> Table:
+    """A table with its columns' headers; `>` at the end of one puts its column to the right."""
+    table = Table(
+        title=title, title_justify="left", title_style="bold", show_header=any(map(_plain, headers))
+    )
+    for header in headers:
+        table.add_column(_plain(header), justify="right" if header.endswith(">") else "left")
+    return table
+
+
+def _plain(header: str) -> str:
+    return header.removesuffix(">")
+
+
+def _range_mm(limits: list[float | None]) -> str:
+    low, high = (_f(value, 1e3) for value in limits)
+    return "free" if limits == [None, None] else f"{low} to {high}"
+
+
+def _f(value: float | None, scale: float = 1.0) -> str:
+    """One decimal, as readings have."""
+    return "none" if value is None else f"{scale * value:.1f}"
+
+
+def _g(value: float | None, digits: int = 3) -> str:
+    return "none" if value is None else f"{value:.{digits}g}"
+
+
+def _print_json(data: Any) -> None:
+    print(json.dumps(data, indent=2, ensure_ascii=False, allow_nan=False))
+
+
+@contextmanager
+def _working(text: str) -> Iterator[None]:
+    """A sign of life on the terminal, on standard error."""
+    console = Console(stderr=True)
+    if console.is_terminal:
+        with console.status(text):
+            yield
+    else:
+        yield
+
+
+@contextmanager
+def _bar(text: str, total: int) -> Iterator[Callable[[int, int], None]]:
+    """A progress bar on standard error, on a terminal only."""
+    from rich.progress import Progress
+
+    console = Console(stderr=True)
+    with Progress(console=console, transient=True, disable=not console.is_terminal) as progress:
+        task = progress.add_task(text, total=total)
+
+        def update(done: int, _: int) -> None:
+            progress.update(task, completed=done)
+
+        yield update

@@ -1,0 +1,275 @@
+"""Figures: what is on them, and that they leave everything else alone."""
+
+from __future__ import annotations
+
+import matplotlib as mpl
+
+mpl.use("Agg")
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from matplotlib import pyplot as plt
+from matplotlib.figure import Figure
+
+import polypod as pp
+from polypod import plots
+from polypod.errors import PolypodError, ShapeError
+from polypod.solids import Solids
+from polypod.style import PALETTE
+
+NAME = "lu-3spu-2rpu-r"
+FILES = [NAME, *sorted(str(path) for path in (Path(__file__).parent / "data").glob("*.toml"))]
+
+
+@pytest.fixture(autouse=True)
+def nothing_else_changes():
+    """Matplotlib's settings stay, and no figure stays open."""
+    before = dict(mpl.rcParams)
+    yield
+    assert dict(mpl.rcParams) == before
+    plt.close("all")
+
+
+@pytest.fixture(scope="module")
+def mech():
+    return pp.load(NAME)
+
+
+@pytest.fixture(scope="module")
+def solution(mech):
+    return pp.solve(mech, pp.load_motion(NAME, mech))
+
+
+def solve_some(mech, **coordinates):
+    """A short motion in the set `pose`."""
+    time = np.linspace(0.0, 1.0, 11)
+    given = {name: value + 0.02 * np.sin(time) for name, value in coordinates.items()}
+    return pp.solve(mech, pp.Motion.through(time, given, set="pose", name="short"))
+
+
+def labels_of(ax):
+    return [line.get_label() for line in ax.lines if not line.get_label().startswith("_")]
+
+
+# --- Fig. 4 -------------------------------------------------------------------------------------------------
+
+
+def test_fig4_has_the_twelve_panels_of_the_paper(solution):
+    figure = Figure(figsize=(10, 10.5))
+    assert plots.plot_fig4(solution, figure) is figure
+    assert [labels_of(ax) for ax in figure.axes] == [
+        ["$X_o$", "$Y_o$", "$Z_o$"],
+        ["$v_x$", "$v_y$", "$v_z$"],
+        ["$a_x$", "$a_y$", "$a_z$"],
+        [r"$\omega_x$", r"$\omega_y$", r"$\omega_z$"],
+        [r"$\varepsilon_x$", r"$\varepsilon_y$", r"$\varepsilon_z$"],
+        [r"$\alpha$", r"$\beta$", r"$\gamma$"],
+        [f"$r_{{{i}}}$" for i in range(1, 6)],
+        [f"$v_{{r{i}}}$" for i in range(1, 6)],
+        [f"$a_{{r{i}}}$" for i in range(1, 6)],
+        [f"$f_{{a{i}}}$" for i in range(1, 6)],
+        ["$f_{c1}$", "$f_{c3}$"],
+        ["$T_c$"],
+    ]
+    letters = [text.get_text() for ax in figure.axes for text in ax.texts]
+    assert letters == [f"({letter})" for letter in "abcdefghijkl"]
+    for ax in figure.axes:
+        assert " / " in ax.get_ylabel()
+
+
+def test_fig4_shows_the_solution(solution):
+    data = solution.dataset
+    axes = plots.plot_fig4(solution).axes
+    time, x = axes[0].lines[0].get_data()
+    np.testing.assert_array_equal(time, data["time"])
+    np.testing.assert_allclose(x, 1e3 * data["pose"][:, 0, 3], rtol=1e-15)
+    np.testing.assert_allclose(axes[5].lines[2].get_ydata(), np.degrees(data["coordinate_gamma"]), rtol=1e-15)
+    assert axes[9].get_ylabel().endswith("/ kN")
+    np.testing.assert_allclose(axes[9].lines[4].get_ydata(), 1e-3 * data["force"][:, 4], rtol=1e-15)
+    np.testing.assert_allclose(axes[11].lines[0].get_ydata(), data["coupled_torque"], rtol=1e-15)
+    limits = [line.get_ydata()[0] for line in axes[6].lines if line.get_label().startswith("_")]
+    assert limits == pytest.approx([650.0, 850.0])
+
+
+def test_fig4_of_a_mechanism_without_rod_shows_its_constraints():
+    mech = pp.load(FILES[1])
+    axes = plots.plot_fig4(solve_some(mech, z=0.5, rx=0.0, ry=0.0)).axes
+    assert len(axes) == 12
+    assert labels_of(axes[10]) == ["$f_{c,1}$", "$f_{c,2}$", "$f_{c,3}$"]
+    assert axes[10].get_ylabel() == "constraint $f_c$ / N"
+    assert labels_of(axes[11]) == [r"$\sigma_\mathrm{min}$"]
+
+
+def test_fig4_of_a_mechanism_without_constraints_shows_power():
+    mech = pp.load(FILES[2])
+    axes = plots.plot_fig4(solve_some(mech, x=0.0, y=0.0, z=0.6, rx=0.0, ry=0.0, rz=0.0)).axes
+    assert labels_of(axes[10]) == ["$P$"]
+    assert labels_of(axes[5]) == ["$r_x$", "$r_y$", "$r_z$"]
+
+
+def test_fig4_marks_states_without_answer(mech, tmp_path):
+    time = np.linspace(0.0, 1.0, 11)
+    given = {"x": 0 * time, "y": 0.04 + 0.5 * time**9, "z": 0.7 + 0 * time}
+    given |= {"alpha": 0 * time, "beta": 0.3 + 0 * time}
+    solution = pp.solve(mech, pp.Motion.through(time, given, set="paper", name="lost"))
+    assert (solution.dataset["status"] == pp.Status.NO_BRANCH).any()
+    figure = plots.plot_fig4(solution)
+    assert all(ax.patches for ax in figure.axes)
+    assert "no branch" in figure.get_supxlabel()
+    plots.save_figure(figure, tmp_path / "lost.png")
+
+
+def test_fig4_without_any_answer(mech, tmp_path):
+    time = np.linspace(0.0, 1.0, 5)
+    given = dict.fromkeys(("x", "alpha", "beta"), 0 * time) | {"y": 0.5 + 0 * time, "z": 0.7 + 0 * time}
+    figure = plots.plot_fig4(pp.solve(mech, pp.Motion.through(time, given, set="paper", name="none")))
+    plots.save_figure(figure, tmp_path / "none.png")
+
+
+# --- the mechanism in space ---------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("file", FILES)
+def test_mechanism_fits_its_axes_at_one_scale(file, tmp_path):
+    mech = pp.load(file)
+    ax = plots.plot_mechanism(mech)
+    plots.save_figure(ax.figure, tmp_path / "m.png")  # draws
+    spans = np.array([np.ptp(limits) for limits in (ax.get_xlim(), ax.get_ylim(), ax.get_zlim())])
+    np.testing.assert_allclose(spans / ax._box_aspect, spans[0] / ax._box_aspect[0])
+    legend = [text.get_text()[0] for text in ax.get_legend().get_texts()]
+    assert set(legend) == {joint for letters in mech.leg_letters for joint in letters.replace("P", "", 1)}
+    texts = [text.get_text() for text in ax.texts]
+    assert len(texts) == len(set(texts)) == 2 * mech.n_legs + 8 + len(mech.rod_names)
+
+
+def test_mechanism_on_given_axes(mech):
+    figure = Figure()
+    ax = figure.add_subplot(projection="3d")
+    assert plots.plot_mechanism(mech, mech.home, ax, labels=False) is ax
+    assert not ax.texts
+    assert ax.get_legend() is None
+    with pytest.raises(PolypodError, match="3d"):
+        plots.plot_mechanism(mech, mech.home, figure.add_subplot())
+
+
+@pytest.mark.parametrize("pose", [np.eye(3), np.zeros((2, 4, 4)), np.full((4, 4), np.nan)])
+def test_what_is_no_pose_is_told(mech, pose):
+    with pytest.raises(ShapeError, match="pose"):
+        plots.plot_mechanism(mech, pose)
+
+
+def test_poses_side_by_side(mech, solution, tmp_path):
+    poses = solution.dataset["pose"].to_numpy()
+    figure = plots.plot_poses(mech, {"home": mech.home, "start": poses[0], "middle": poses[400]}, columns=2)
+    assert len(figure.axes) == 3
+    captions = [text.get_text() for text in figure.texts]
+    assert captions == ["(a)  home", "(b)  start", "(c)  middle"]
+    scales = {tuple(np.round(ax._box_aspect, 9)) for ax in figure.axes}
+    assert len(scales) == 1
+    plots.save_figure(figure, tmp_path / "poses.svg")
+    assert len(plots.plot_poses(mech, iter(poses[:2])).axes) == 2
+    with pytest.raises(ShapeError, match="empty"):
+        plots.plot_poses(mech, [])
+
+
+def test_leg_names_of_any_kind_are_drawn(tmp_path):
+    data = pp.load(FILES[1]).to_dict()
+    for leg, name in zip(data["legs"], ("front_left", "$x^2$ {", "größe 7"), strict=True):
+        leg["name"] = name
+    mech = pp.Mechanism.from_dict(data)
+    plots.save_figure(plots.plot_mechanism(mech).figure, tmp_path / "m.png")
+    plots.save_figure(plots.plot_topology(mech.mobility()).figure, tmp_path / "t.png")
+    plots.save_figure(plots.plot_fig4(solve_some(mech, z=0.5, rx=0.0, ry=0.0)), tmp_path / "f.png")
+
+
+def test_passive_leg_with_a_fixed_joint(tmp_path):
+    """A Tricept: three UPS legs around a passive UPF post."""
+    data = pp.load(FILES[2]).to_dict()
+    del data["published"]
+    arms = [
+        {
+            "base": {"joint": "U", "point": {"radius": 500, "angle": angle}, "axis": {"angle": angle + 90}},
+            "platform": {"joint": "S", "point": {"radius": 200, "angle": angle}},
+        }
+        for angle in (90, 210, 330)
+    ]
+    post = {
+        "name": "post",
+        "actuated": False,
+        "base": {"joint": "U", "point": [0, 0, 0], "axis": [1, 0, 0]},
+        "platform": {"joint": "F", "point": [0, 0, 0], "axis": [0, 0, 1], "normal": [0, 1, 0]},
+    }
+    mech = pp.Mechanism.from_dict({**data, "legs": [*arms, post]})
+    plots.save_figure(plots.plot_mechanism(mech).figure, tmp_path / "m.png")
+    ax = plots.plot_topology(mech.mobility())
+    assert "piston post" not in [text.get_text() for text in ax.texts]
+
+
+@pytest.mark.parametrize("normal", [[0.0, 0.0, 1.0], [0.6, 0.0, 0.8]])
+def test_plates_reach_as_far_as_their_margin(normal):
+    """Round one joint and round joints on a line."""
+    normal = np.array(normal)
+    side = np.cross(normal, [0.0, 1.0, 0.0])
+    for spots in ([0.0], [0.0, 1.0], [0.0, 1.0, 3.0]):
+        solids = Solids()
+        points = np.array([spot * side for spot in spots])
+        solids.plate(points, normal, thickness=0.1, margin=0.5, color="white", viewer=normal)
+        corners = solids.faces().reshape(-1, 3)
+        nearest = np.clip(corners @ side, 0.0, max(spots))[:, None] * side
+        distance = np.linalg.norm(corners - nearest, axis=-1)
+        assert distance.max() < np.hypot(0.5, 0.1) + 1e-9
+        assert (corners @ side).max() == pytest.approx(max(spots) + 0.5, abs=2e-3)
+        assert solids.shades().shape == (len(solids.faces()), 3)
+        assert ((solids.shades() >= 0) & (solids.shades() <= 1)).all()
+
+
+# --- topology -----------------------------------------------------------------------------------------------
+
+
+def test_topology_of_the_paper(mech):
+    ax = plots.plot_topology(mech.mobility())
+    texts = [text.get_text() for text in ax.texts]
+    for link in ("base  (quaternary)", "platform  (pentagonal)", "rod L  (ternary)", "piston 3"):
+        assert link in texts
+    joints = [text for text in texts if len(text) == 1]
+    assert {kind: joints.count(kind) for kind in "RSUP"} == {"R": 3, "S": 3, "U": 5, "P": 5}
+    height = {text.get_text(): text.get_position()[1] for text in ax.texts}
+    chain = ("base  (quaternary)", "rod L  (ternary)", "cylinder 1", "piston 1", "platform  (pentagonal)")
+    assert [height[link] for link in chain] == sorted(height[link] for link in chain)
+    x = {text.get_text(): text.get_position()[0] for text in ax.texts}
+    assert abs(x["cylinder 1"] - x["cylinder 3"]) == 1  # legs of one rod stand side by side
+
+
+@pytest.mark.parametrize("file", FILES)
+def test_topology_of_any_mechanism(file):
+    mobility = pp.load(file).mobility()
+    figure = Figure()
+    ax = figure.add_subplot()
+    assert plots.plot_topology(mobility, ax) is ax
+    assert len(ax.patches) == mobility.links
+    assert len(ax.texts) == mobility.links + mobility.joints
+
+
+# --- files --------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("suffix", [".svg", ".png"])
+def test_saved_figures_are_the_same_bytes_each_time(mech, tmp_path, suffix):
+    files = []
+    for name in ("first", "second"):
+        path = tmp_path / (name + suffix)
+        plots.save_figure(plots.plot_mechanism(mech).figure, path)
+        files.append(path.read_bytes())
+    assert files[0] == files[1]
+    assert len(files[0]) > 20_000
+
+
+def test_unknown_suffix(tmp_path):
+    with pytest.raises(PolypodError, match=r"\.svg or \.png"):
+        plots.save_figure(Figure(), tmp_path / "figure.gif")
+
+
+def test_palette_is_distinct():
+    assert len(set(PALETTE)) == len(PALETTE) == 7
