@@ -200,7 +200,7 @@ class Mechanism:
     def __init__(
         self, data: Mapping[str, Any], *, text: str | None = None, origin: str = "the mechanism"
     ) -> None:
-        self._data: dict[str, Any] = copy.deepcopy(dict(data))
+        self._data: dict[str, Any] = _plain(data)
         self._text = text
         spec, faults = read_spec(self._data)
         try:
@@ -251,6 +251,9 @@ class Mechanism:
         return isinstance(other, Mechanism) and self._data == other._data
 
     __hash__ = None  # type: ignore[assignment]
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _from_parts, (self._data, self._text)
 
     def __repr__(self) -> str:
         return f"<Mechanism {self.name}: {'+'.join(self.leg_letters)}, {self.dof} freedoms>"
@@ -596,6 +599,22 @@ class Mechanism:
         return shape, [_spread(a, shape, arguments[name][1]) for name, a in arrays.items()]
 
 
+def _plain(value: Any) -> Any:
+    """A file's content in the types that reading one gives, whatever arrays and sequences it is made of."""
+    match value:
+        case Mapping():
+            return {str(key): _plain(entry) for key, entry in value.items()}
+        case np.ndarray() | np.generic():
+            return value.tolist()
+        case list() | tuple():
+            return [_plain(entry) for entry in value]
+    return value
+
+
+def _from_parts(data: dict[str, Any], text: str | None) -> Mechanism:
+    return Mechanism(data, text=text)
+
+
 def _number(name: str, value: ArrayLike) -> Array:
     return _array(name, value, ())
 
@@ -649,7 +668,7 @@ def load(source: str | Path) -> Mechanism:
     if not path.is_file():
         raise UnknownNameError("mechanism file or built-in mechanism", name, list_mechanisms())
     try:
-        text = path.read_text(encoding="utf-8")
+        text = path.read_text(encoding="utf-8-sig")
     except UnicodeDecodeError as error:
         raise MechanismError([Fault("toml", f"is not UTF-8 text: {error}")], name) from None
     return Mechanism.from_toml(text, origin=name)

@@ -437,7 +437,8 @@ def _read_toml(text: str, source: str, mech: HasCoordinateSets | CoordinateSets)
     if chosen not in sets:
         if settings:
             message = f"is {shown(chosen)}, no coordinate set of the mechanism; {alternatives(chosen, sets)}"
-            faults.append(Fault("motion.coordinates", message))
+            # Which names the keyframes should have is then open: no more can be said of them.
+            raise MotionError([*faults, Fault("motion.coordinates", message)], source)
         chosen = _nearest_set(given, sets)
     model = _keyframe(sets[chosen])
     read = [read_table(model, table, f"keyframes.{i}", faults) for i, table in enumerate(tables, 1)]

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from typing import Annotated, Any, Literal, TypeVar
 
 import numpy as np
-from annotated_types import Len
+from annotated_types import Ge, Len, MinLen
 from pydantic import BaseModel, ConfigDict, Discriminator, Field, Strict, Tag, ValidationError
 
 from polypod.errors import Fault, alternatives, shown
@@ -31,6 +31,7 @@ class Table(BaseModel):
 
 # Tags end up in the place of an error; <...> marks them, so that they can be left out of it again.
 Number = Annotated[float, Strict(), Field(allow_inf_nan=False)]
+Count = Annotated[int, Strict(), Ge(0)]
 Vector = Annotated[list[Number], Len(3, 3)]
 
 
@@ -76,7 +77,7 @@ Inertia = Annotated[_N | _V | _M, Discriminator(_number_vector_or_matrix)]
 class Header(Table):
     """What stands above the first table."""
 
-    name: str
+    name: Annotated[str, MinLen(1)]
     description: str = ""
     source: str = ""
 
@@ -115,9 +116,9 @@ class Tool(Table):
 class Published(Table):
     """The mobility terms that the source gives (Eq. 1 of the paper)."""
 
-    dof: Annotated[int, Strict()]
-    redundant: Annotated[int, Strict()]
-    passive: Annotated[int, Strict()]
+    dof: Count
+    redundant: Count
+    passive: Count
 
 
 class Body(Table):
@@ -227,6 +228,7 @@ def read_spec(data: dict[str, Any]) -> tuple[dict[str, Any], list[Fault]]:
     gravity = STANDARD_GRAVITY if dynamics.gravity is None else units.vector(dynamics.gravity, "acceleration")
     spec = {
         "name": head.name if head else "",
+        "angles_known": not any(fault.place in ("units", "units.angle") for fault in faults),
         "platform": platform and _body(platform.mass, platform.center, platform.inertia, units),
         "rods": [_rod(rod, f"rods.{i}", units, faults) for i, rod in enumerate(rods, 1)],
         "legs": [_leg(leg, i, rod_names, units, faults) for i, leg in enumerate(legs, 1)],
@@ -403,6 +405,7 @@ _NEEDED = {
     "int_type": "a whole number",
     "bool_type": "true or false",
     "string_type": "text in quotes",
+    "string_too_short": "some text",
 }
 
 

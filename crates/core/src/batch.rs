@@ -571,7 +571,8 @@ pub fn states(mech: &Mechanism, input: &Coordinates, n: usize) -> Table {
         let state = checked(mech, state, all_given);
         let jumped = input.continued && state.status == Status::Ok && state.branch * branch < 0.0;
         table.status[i] = if jumped { Status::BranchJump } else { state.status };
-        let solved = matches!(table.status[i], Status::Ok | Status::Fold);
+        let found = state.platform.pose.rotation.0.iter().all(|c| c.norm().is_finite());
+        let solved = found && matches!(table.status[i], Status::Ok | Status::Fold);
         if solved {
             if state.status == Status::Ok {
                 (last, branch) = (state.platform.pose, state.branch);

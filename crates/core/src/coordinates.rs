@@ -51,6 +51,9 @@ const COSINE_ROUNDING: f64 = 1e-12;
 /// Pivot ratio below which the dependent coordinates are not determined.
 const DEPENDENT_PIVOTS: f64 = 1e-9;
 
+/// Residual, as a pure number, that is rounding of zero.
+const SOLVED: f64 = 1e-12;
+
 const NEWTON_STEPS: usize = 50;
 
 impl Set {
@@ -302,13 +305,11 @@ pub fn state(
     let mut q = *q;
     let finite =
         q.iter().zip(given).all(|(c, g)| !g || (c.x.is_finite() && c.d.is_finite() && c.dd.is_finite()));
-    let (status, branch) = if finite {
-        match set {
-            Set::Paper(plane) => (branch_of_gamma(plane, &mut q, branch), branch),
-            _ => solve_dependent(mech, set, &mut q, given, guess),
-        }
-    } else {
-        (Status::InvalidInput, f64::NAN)
+    let (status, branch) = match (set, finite) {
+        (_, false) => (Status::InvalidInput, f64::NAN),
+        (Set::Tool, _) if tool_turn(mech, &q) != Status::Ok => (tool_turn(mech, &q), f64::NAN),
+        (Set::Paper(plane), _) => (branch_of_gamma(plane, &mut q, branch), branch),
+        _ => solve_dependent(mech, set, &mut q, given, guess),
     };
     let pose = set.pose(mech, &q);
     let part = |a: Vec3<Jet<f64>>, of: fn(Jet<f64>) -> f64| a.map(of);
@@ -318,9 +319,20 @@ pub fn state(
         twist: Twist::new(part(o, |j| j.d), half_cross(&r, |j| j.d)),
         acceleration: Acceleration::new(part(o, |j| j.dd), half_cross(&r, |j| j.dd)),
     };
-    // A tool axis opposite to the one at home has no shortest turn.
-    let undefined = status == Status::Ok && r.0.iter().any(|c| !c.norm().x.is_finite());
-    State { coordinates: q, platform, branch, status: if undefined { Status::Fold } else { status } }
+    State { coordinates: q, platform, branch, status }
+}
+
+/// Whether there is a shortest turn from the tool axis at home: not to no direction, and not to the opposite one.
+fn tool_turn(mech: &Mechanism, q: &Values<Jet<f64>>) -> Status {
+    let axis = Vec3::new(q[3].x, q[4].x, q[5].x);
+    let cosine = axis.dot(mech.home.rotation * mech.tool_axis) / axis.norm();
+    if cosine.is_nan() {
+        Status::InvalidInput
+    } else if 1.0 + cosine < FOLD * FOLD {
+        Status::Fold
+    } else {
+        Status::Ok
+    }
 }
 
 /// `½ Σ x_i × x_i'` over the columns of R is ω, `½ Σ x_i × x_i''` is ε \[T19\].
@@ -385,6 +397,8 @@ fn solve_dependent(
         let largest =
             dependent.iter().zip(&step).map(|(&i, s)| s.abs() / reach(set, i, scale)).fold(0.0, f64::max);
         if !size(&step).is_finite() {
+            // The coordinates do not determine the others; the guess may still be a solution.
+            converged = size(&g) <= SOLVED;
             break;
         }
         let mut share = (0.5 / largest).min(1.0);

@@ -3,6 +3,7 @@
 //! Labels in brackets name their source: `[Eq. 26]` an equation of Lu, Liu, Zhang, Ye and Wang, "Dynamics analysis of
 //! a novel 5-DoF parallel manipulator with couple-constrained wrench"; `[T6]` one of `docs/theory.md`.
 
+pub mod assembly;
 pub mod batch;
 pub mod constraint;
 pub mod coordinates;

@@ -149,7 +149,7 @@ fn generic_poses(mech: &Mechanism) -> Vec<Pose<f64>> {
             rotation: Mat3::from_rotation_vector(vector() * 0.3) * mech.home.rotation,
             o: mech.home.o + vector() * (0.3 * size),
         };
-        poses.extend(project(mech, &start));
+        poses.extend(project(&mech.constraints, size, &start));
     }
     if poses.is_empty() {
         poses.push(mech.home);
@@ -157,17 +157,16 @@ fn generic_poses(mech: &Mechanism) -> Vec<Pose<f64>> {
     poses
 }
 
-/// The pose that satisfies all constraints, found from `start` by Gauss-Newton steps of least size, or none.
+/// The pose that satisfies `constraints`, found from `start` by damped Gauss-Newton steps of least size, or none.
 #[must_use]
-pub fn project(mech: &Mechanism, start: &Pose<f64>) -> Option<Pose<f64>> {
-    let size = mech.characteristic_length;
+pub fn project(constraints: &[Constraint], size: f64, start: &Pose<f64>) -> Option<Pose<f64>> {
     let mut pose = *start;
     for _ in 0..NEWTON_STEPS {
-        let rows: Vec<Wrench<f64>> = mech.constraints.iter().map(|c| constraint::row(c, &pose)).collect();
+        let rows: Vec<Wrench<f64>> = constraints.iter().map(|c| constraint::row(c, &pose)).collect();
         let sizes: Vec<f64> = rows.iter().map(|row| constraint::row_size(row, size)).collect();
         let residual = DVector::from_iterator(
             rows.len(),
-            mech.constraints.iter().zip(&sizes).map(|(c, s)| constraint::value(c, &pose) / s),
+            constraints.iter().zip(&sizes).map(|(c, s)| constraint::value(c, &pose) / s),
         );
         if residual.amax() <= 1e-13 * size {
             return Some(pose);
@@ -176,7 +175,14 @@ pub fn project(mech: &Mechanism, start: &Pose<f64>) -> Option<Pose<f64>> {
             return None;
         }
         let g = scaled_rows(&rows, &sizes, size);
-        let step = g.svd(true, true).solve(&residual, RANK_TOLERANCE).ok()?;
+        // Off the constraints redundant rows disagree; a damping of the order of the residual (Levenberg and Marquardt)
+        // keeps their disagreement from being followed and vanishes with it.
+        let svd = g.svd(true, true);
+        let (u, vt, damping) = (svd.u?, svd.v_t?, residual.amax() / size);
+        let floor = svd.singular_values.max() * RANK_TOLERANCE;
+        let damped = |s: f64| if s > floor { s / (s * s + damping * damping) } else { 0.0 };
+        let step =
+            vt.transpose() * svd.singular_values.map(damped).component_mul(&(u.transpose() * &residual));
         let [x, y, z, p, q, r]: [f64; 6] = std::array::from_fn(|i| -step[i]);
         pose.o = pose.o + Vec3::new(x, y, z);
         pose.rotation = Mat3::from_rotation_vector(Vec3::new(p, q, r) * (1.0 / size)) * pose.rotation;

@@ -233,6 +233,15 @@ impl Mat3<f64> {
         )
     }
 
+    /// The inverse of [`Mat3::from_rotation_vector`] for turns below a half turn.
+    #[must_use]
+    pub fn rotation_vector(self) -> Vec3<f64> {
+        let [a, b, c] = self.0;
+        let w = Vec3::new(b.z - c.y, c.x - a.z, a.y - b.x) * 0.5;
+        let (s, c) = (w.norm(), (a.x + b.y + c.z - 1.0) * 0.5);
+        if s == 0.0 { w } else { w * (s.atan2(c) / s) }
+    }
+
     /// How far from a rotation: the largest entry of `MᵀM - 1`, or infinity for a mirror image.
     #[must_use]
     pub fn rotation_error(self) -> f64 {

@@ -1,6 +1,6 @@
 //! The mechanism as it is described from outside: plain data in SI units, parts that could not be read left out.
-//! [`Spec::check`] finds every fault that one part shows by itself; what parts must be to each other is
-//! checked where the [`Mechanism`](crate::mechanism::Mechanism) is made from them.
+//! The checks here find every fault that one part shows by itself; what parts must be to each other is
+//! checked where they are put together, in [`assemble`](crate::assembly::assemble).
 
 use serde::Deserialize;
 
@@ -136,6 +136,8 @@ pub struct ToolSpec {
 #[serde(deny_unknown_fields)]
 pub struct Spec {
     pub name: String,
+    /// False where the unit of angles could not be read, so that the geometry cannot be judged.
+    pub angles_known: bool,
     pub legs: Vec<Option<LegSpec>>,
     pub rods: Vec<Option<RodSpec>>,
     pub platform: Option<BodySpec>,
@@ -155,17 +157,14 @@ impl Spec {
         serde_json::from_str(text).map_err(|e| vec![Fault::new("mechanism", e.to_string())])
     }
 
-    /// Every fault that a part shows by itself.
+    /// Faults of names, numbers and bodies, which say nothing of the geometry.
     #[must_use]
-    pub fn check(&self) -> Vec<Fault> {
+    pub fn check_values(&self) -> Vec<Fault> {
         let mut faults = Faults::default();
-        if self.legs.is_empty() {
-            faults.add("legs", "there is none; a mechanism needs at least one leg");
-        }
         faults.finite3("dynamics.gravity", self.gravity);
         if !(self.efficiency > 0.0 && self.efficiency <= 1.0) {
-            faults
-                .add("dynamics.efficiency", format!("is {}; must be above 0 and at most 1", self.efficiency));
+            let message = format!("is {}; must be above 0 and at most 1", self.efficiency);
+            faults.add("dynamics.efficiency", message);
         }
         for (place, mu) in [("linear", self.linear_damping), ("angular", self.angular_damping)] {
             if !(mu >= 0.0 && mu.is_finite()) {
@@ -176,26 +175,48 @@ impl Spec {
         faults.finite3("load.torque", self.load.torque);
         faults.finite3("tool.point", self.tool.point);
         faults.axis("tool.axis", self.tool.axis);
+        faults.body("platform", self.platform.as_ref());
+        for (place, rod) in numbered("rods", &self.rods) {
+            faults.body(&place, rod.body.as_ref());
+        }
+        for (place, leg) in numbered("legs", &self.legs) {
+            faults.leg(&place, leg, self.angles_known);
+        }
+        faults.same_names(numbered("legs", &self.legs).map(|(place, leg)| (place, leg.name.as_str())));
+        faults.same_names(numbered("rods", &self.rods).map(|(place, rod)| (place, rod.name.as_str())));
+        faults.0
+    }
+
+    /// Faults of the points and axes, each by itself.
+    #[must_use]
+    pub fn check_parts(&self) -> Vec<Fault> {
+        let mut faults = Faults::default();
+        if self.legs.is_empty() {
+            faults.add("legs", "there is none; a mechanism needs at least one leg");
+        }
         if let Some(home) = &self.home {
             faults.finite3("home.position", home.position);
             faults.finite3("home.rotation_vector", home.rotation_vector);
         }
-        faults.body("platform", self.platform.as_ref());
-        for (i, rod) in self.rods.iter().enumerate() {
-            let Some(rod) = rod else { continue };
-            let place = format!("rods.{}", i + 1);
+        for (place, rod) in numbered("rods", &self.rods) {
             faults.finite3(&format!("{place}.point"), rod.point);
             faults.axis(&format!("{place}.axis"), rod.axis);
-            faults.body(&place, rod.body.as_ref());
         }
-        for (i, leg) in self.legs.iter().enumerate() {
-            let Some(leg) = leg else { continue };
-            faults.leg(&format!("legs.{}", i + 1), leg, self.rods.len());
+        for (place, leg) in numbered("legs", &self.legs) {
+            for (side, joint) in [("base", &leg.base), ("platform", &leg.platform)] {
+                faults.joint(&format!("{place}.{side}"), joint, self.rods.len());
+            }
+            if leg.platform.rod.is_some() {
+                faults.add(format!("{place}.platform.rod"), "a rod carries base joints only");
+            }
         }
-        faults.same_names("legs", self.legs.iter().flatten().map(|leg| leg.name.as_str()));
-        faults.same_names("rods", self.rods.iter().flatten().map(|rod| rod.name.as_str()));
         faults.0
     }
+}
+
+/// The parts that could be read, each with its place.
+fn numbered<'a, T>(kind: &str, parts: &'a [Option<T>]) -> impl Iterator<Item = (String, &'a T)> {
+    parts.iter().enumerate().filter_map(move |(i, part)| Some((format!("{kind}.{}", i + 1), part.as_ref()?)))
 }
 
 /// The list of faults while it grows.
@@ -221,12 +242,14 @@ impl Faults {
         }
     }
 
-    fn leg(&mut self, place: &str, leg: &LegSpec, rods: usize) {
+    fn leg(&mut self, place: &str, leg: &LegSpec, angles_known: bool) {
         for (side, joint) in [("base", &leg.base), ("platform", &leg.platform)] {
-            self.joint(&format!("{place}.{side}"), joint, rods);
-        }
-        if leg.platform.rod.is_some() {
-            self.add(format!("{place}.platform.rod"), "a rod carries base joints only");
+            if let Some(cone) = joint.cone.as_ref().filter(|_| angles_known)
+                && !(cone.angle > 0.0 && cone.angle <= std::f64::consts::PI)
+            {
+                let message = format!("is {} rad; must be above 0 and at most pi", cone.angle);
+                self.add(format!("{place}.{side}.cone.angle"), message);
+            }
         }
         if let Some([min, max]) = leg.stroke
             && !(min >= 0.0 && min < max && max.is_finite())
@@ -294,16 +317,8 @@ impl Faults {
         {
             self.add(format!("{place}.normal"), "must be square to the axis");
         }
-        if let Some(cone) = &joint.cone {
-            if !(cone.angle > 0.0 && cone.angle <= std::f64::consts::PI) {
-                self.add(
-                    format!("{place}.cone.angle"),
-                    format!("is {} rad; must be above 0 and at most pi", cone.angle),
-                );
-            }
-            if let Some(axis) = cone.axis {
-                self.axis(&format!("{place}.cone.axis"), axis);
-            }
+        if let Some(axis) = joint.cone.as_ref().and_then(|cone| cone.axis) {
+            self.axis(&format!("{place}.cone.axis"), axis);
         }
     }
 
@@ -321,13 +336,16 @@ impl Faults {
         }
     }
 
-    fn same_names<'a>(&mut self, place: &str, names: impl Iterator<Item = &'a str>) {
-        let mut seen = Vec::new();
-        for name in names {
-            if seen.contains(&name) {
-                self.add(place, format!("the name \"{name}\" stands twice; each needs its own"));
+    fn same_names<'a>(&mut self, names: impl Iterator<Item = (String, &'a str)>) {
+        let mut seen: Vec<(String, &str)> = Vec::new();
+        for (place, name) in names {
+            if let Some((first, _)) = seen.iter().find(|(_, other)| *other == name) {
+                self.add(
+                    format!("{place}.name"),
+                    format!("is \"{name}\", the name of {first}; each needs its own"),
+                );
             }
-            seen.push(name);
+            seen.push((place, name));
         }
     }
 }

@@ -223,6 +223,29 @@ fn carrying_a_wrench_keeps_its_power() {
     }
 }
 
+/// The power balance cannot see ω × I ω, which does no work: this can.
+#[test]
+fn inertial_wrenches_are_rates_of_momentum() {
+    for mech in mechanisms() {
+        for state in samples(&mech) {
+            let body = &mech.platform;
+            let moving = moving(&state);
+            let center = parts(moving.o + moving.rotation * Vec3::lift(body.center));
+            let (omega, eps) = (state.twist.omega, state.acceleration.eps);
+            let spin = common::jets(omega, eps, Vec3::zero());
+            let inertia = Mat3::lift(body.inertia);
+            let [_, momentum_rate, _] =
+                parts(moving.rotation * (inertia * moving.rotation.transpose_mul(spin)));
+            let force = (mech.gravity - center[2]) * body.mass;
+            let damping = Wrench::new(state.twist.v * mech.linear_damping, omega * mech.angular_damping);
+            let found = dynamics::platform_wrench(&mech, &state) + damping;
+            close(found.force, force, EXACT, "force");
+            let torque = (center[0] - state.pose.o).cross(force) - momentum_rate;
+            close(found.torque, torque, EXACT, "torque");
+        }
+    }
+}
+
 /// Forces times leg rates are what load, damping and weight give and what inertia takes, with energies from
 /// velocities alone.
 #[test]

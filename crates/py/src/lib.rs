@@ -4,6 +4,7 @@
 #![allow(clippy::needless_pass_by_value)]
 
 use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray1};
+use polypod_core::assembly::assemble;
 use polypod_core::batch::{self, Coordinates, Loads, States, Table};
 use polypod_core::coordinates::Set;
 use polypod_core::mechanism::Mechanism;
@@ -79,7 +80,7 @@ fn loads<'a>(wrench: Option<&'a Array<'_>>, platform_axes: bool, poses: &[f64]) 
 impl PyMechanism {
     #[new]
     fn new(spec: &str) -> PyResult<Self> {
-        Mechanism::new(&Spec::from_json(spec).map_err(raise)?).map(PyMechanism).map_err(raise)
+        assemble(&Spec::from_json(spec).map_err(raise)?).map(PyMechanism).map_err(raise)
     }
 
     #[getter]

@@ -2,6 +2,7 @@
 
 #![allow(dead_code)] // each test file uses its share
 
+use polypod_core::assembly::assemble;
 use polypod_core::coordinates::{self, MAX_COORDINATES, Set};
 use polypod_core::mechanism::Mechanism;
 use polypod_core::mobility;
@@ -130,10 +131,10 @@ fn generic(name: &str, letters: &[String], on_rod: usize, actuated: usize, seed:
     let rod = serde_json::json!({ "name": "L", "point": point.array(), "axis": line.array(), "body": body(&mut draw, false) });
     let rods = if on_rod > 0 { vec![rod] } else { vec![] };
     let spec = serde_json::json!({
-        "name": name, "legs": legs, "rods": rods, "platform": body(&mut draw, false),
+        "name": name, "angles_known": true, "legs": legs, "rods": rods, "platform": body(&mut draw, false),
         "gravity": [0.3, -0.2, -9.81], "efficiency": 0.9, "linear_damping": 3.0, "angular_damping": 0.4,
         "load": { "force": [10.0, -20.0, 30.0], "torque": [4.0, 5.0, -6.0], "axes": "platform" },
-        "home": { "position": home.0.array(), "rotation_vector": rotation_vector(&rotation).array() },
+        "home": { "position": home.0.array(), "rotation_vector": rotation.rotation_vector().array() },
         "tool": { "point": [0.0, 0.0, 0.1], "axis": [0.0, 0.0, 1.0] },
     });
     make(&spec.to_string())
@@ -166,7 +167,7 @@ pub fn published() -> Mechanism {
         .collect();
     let line = 0.270 * 18.0_f64.to_radians().sin();
     let spec = serde_json::json!({
-        "name": "lu", "legs": legs, "platform": body(3.0, 0.0, 5.0),
+        "name": "lu", "angles_known": true, "legs": legs, "platform": body(3.0, 0.0, 5.0),
         "rods": [{ "name": "L", "point": [0.0, line, 0.0], "axis": [1.0, 0.0, 0.0], "body": body(2.0, 0.0, 2.0) }],
         "gravity": [0.0, 0.0, -9.81], "efficiency": 1.0, "linear_damping": 0.0, "angular_damping": 0.0,
         "load": { "force": [10.0, 10.0, 500.0], "torque": [0.0, 0.0, 1000.0], "axes": "base" },
@@ -177,14 +178,7 @@ pub fn published() -> Mechanism {
 }
 
 fn make(spec: &str) -> Mechanism {
-    Mechanism::new(&Spec::from_json(spec).expect("a readable spec")).expect("a sound mechanism")
-}
-
-fn rotation_vector(r: &Mat3<f64>) -> Vec3<f64> {
-    let m = r.rows();
-    let w = Vec3::new(m[2][1] - m[1][2], m[0][2] - m[2][0], m[1][0] - m[0][1]) * 0.5;
-    let (s, c) = (w.norm(), (m[0][0] + m[1][1] + m[2][2] - 1.0) * 0.5);
-    w * (s.atan2(c) / s)
+    assemble(&Spec::from_json(spec).expect("a readable spec")).expect("a sound mechanism")
 }
 
 /// States that keep the constraints: a pose near home and a motion through it, made with the coordinate set `pose`,
@@ -200,7 +194,7 @@ pub fn states(mech: &Mechanism, count: usize, seed: u64) -> Vec<Motion<f64>> {
             rotation: Mat3::from_rotation_vector(draw.vector() * 0.3) * mech.home.rotation,
             o: mech.home.o + draw.vector() * 0.1,
         };
-        let Some(pose) = mobility::project(mech, &start) else {
+        let Some(pose) = mobility::project(&mech.constraints, mech.characteristic_length, &start) else {
             continue;
         };
         let at = Set::Pose.values(mech, &pose);
