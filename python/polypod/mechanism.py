@@ -6,188 +6,35 @@ import copy
 import json
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import tomli_w
 from numpy.typing import ArrayLike, NDArray
 
 from polypod import _core
+from polypod.answers import (
+    Array,
+    Codes,
+    Conditioning,
+    CoupledForces,
+    GraphJoint,
+    GraphLink,
+    InverseDynamics,
+    InverseKinematics,
+    Kinematics,
+    Mobility,
+    Power,
+    Published,
+    State,
+)
 from polypod.errors import CoordinateError, Fault, MechanismError, ShapeError, UnknownNameError, alternatives
 from polypod.schema import read_spec
 
-Array = NDArray[np.float64]
-Codes = NDArray[np.uint8]
-
 NEAR_SINGULAR = 0.01
 """Smallest singular value (a pure number) below which a pose is called nearly singular."""
-
-
-class State(NamedTuple):
-    """A platform's motion, and all numbers of its coordinate set."""
-
-    pose: Array
-    """(..., 4, 4)."""
-    twist: Array
-    """(..., 6): v of o in m/s, ω in rad/s."""
-    acceleration: Array
-    """(..., 6): a of o in m/s^2, ε in rad/s^2."""
-    coordinates: dict[str, Array]
-    """Given and dependent ones, m and rad."""
-    coordinate_rates: dict[str, Array]
-    coordinate_second_rates: dict[str, Array]
-    status: Codes
-
-
-class InverseKinematics(NamedTuple):
-    """Legs at a pose [Eq. 3]."""
-
-    lengths: Array
-    """(..., n), m."""
-    vectors: Array
-    """(..., n, 3): r from B to b, m."""
-    directions: Array
-    """(..., n, 3): δ."""
-    status: Codes
-
-
-class Kinematics(NamedTuple):
-    """Motion of legs, rods, links and joints [Eq. 2-39], base axes, SI."""
-
-    lengths: Array
-    rates: Array
-    accelerations: Array
-    directions: Array
-    leg_omega: Array
-    leg_eps: Array
-    leg_spin: Array
-    """Share of the leg's angular velocity along δ, rad/s."""
-    leg_spin_rate: Array
-    piston_velocity: Array
-    piston_acceleration: Array
-    cylinder_velocity: Array
-    cylinder_acceleration: Array
-    base_joint_angles: Array
-    """(..., n, 2): leg against base, zero at home: about the base's axis, then about n; NaN where none."""
-    base_joint_rates: Array
-    platform_joint_angles: Array
-    """(..., n, 2): platform against leg, zero at home: about the platform's axis, then about n [Eq. 29]."""
-    platform_joint_rates: Array
-    base_cone_angle: Array
-    """(..., n): between leg and cone axis of the base joint, rad."""
-    platform_cone_angle: Array
-    rod_angle: Array
-    """(..., k): turn of each rod about its line, zero at home."""
-    rod_omega: Array
-    rod_eps: Array
-    status: Codes
-
-
-class InverseDynamics(NamedTuple):
-    """What balances a motion [Eq. 43]."""
-
-    forces: Array
-    """(..., n): active forces, N, positive when they push the platform away; zero for passive legs."""
-    constraint: Array
-    """(..., k): multipliers of the independent constraints; f_c in N for the paper's mechanism."""
-    status: Codes
-
-
-class CoupledForces(NamedTuple):
-    """Forces of two legs on one rod, and the torque on the rod [T16]."""
-
-    legs: tuple[str, str]
-    forces: Array
-    """(..., 2): f_c1 and f_c3 on the platform at b_1 and b_3 along c_1 = r_1×L/|r_1×L|, N.
-
-    As printed, f_c3 is along c_3 = -c_1.
-    """
-    torque: Array
-    """(...): T_c about the rod's line, N m."""
-    status: Codes
-
-
-class Power(NamedTuple):
-    """Energies and powers of a motion [T17]; W and J."""
-
-    kinetic: Array
-    potential: Array
-    kinetic_rate: Array
-    potential_rate: Array
-    actuators: Array
-    load: Array
-    damping: Array
-    friction: Array
-    """Power that the efficiency η stands for, negative where it takes."""
-    residual: Array
-    """actuators + load + damping + friction - kinetic_rate - potential_rate: zero up to rounding."""
-    status: Codes
-
-
-class Conditioning(NamedTuple):
-    """Singular values of the leg Jacobian on the twists that the constraints allow [T24]; pure numbers."""
-
-    sigma_min: Array
-    sigma_max: Array
-    condition: Array
-    status: Codes
-
-
-@dataclass(frozen=True)
-class GraphLink:
-    """A link of the topology graph; `joints` are indices."""
-
-    name: str
-    joints: tuple[int, ...]
-
-
-@dataclass(frozen=True)
-class GraphJoint:
-    """A joint of the topology graph between two links."""
-
-    kind: str
-    name: str
-    links: tuple[int, int]
-
-
-@dataclass(frozen=True)
-class Published:
-    """The accounting that the mechanism's publication gives."""
-
-    dof: int
-    redundant: int
-    passive: int
-
-
-@dataclass(frozen=True)
-class Mobility:
-    """Freedoms of the mechanism from ranks at generic poses, in the terms of Eq. 1 [T18]."""
-
-    dof: int
-    links: int
-    joints: int
-    joint_freedoms: int
-    loops: int
-    closure_rank: int
-    redundant: int
-    """Loop-closure equations that say nothing new: ς of Eq. 1."""
-    redundant_legs: tuple[str, ...]
-    """The legs whose constraints they couple."""
-    passive: int
-    """Freedoms that leave the platform where it is: M_0 of Eq. 1."""
-    passive_legs: tuple[str, ...]
-    uncontrolled: int
-    """Freedoms that remain at generic poses with all actuators locked: zero unless the design is singular."""
-    constraint_rows: tuple[tuple[str, str], ...]
-    """Leg and kind (A-E) of every scalar constraint."""
-    independent_rows: tuple[int, ...]
-    """Indices of those that are independent."""
-    graph_links: tuple[GraphLink, ...]
-    graph_joints: tuple[GraphJoint, ...]
-    published: Published | None
 
 
 class Mechanism:
@@ -399,6 +246,15 @@ class Mechanism:
         Raises:
             CoordinateError: names that make up no set of this mechanism.
             ShapeError: arrays that do not broadcast.
+
+        >>> import polypod as pp
+        >>> mech = pp.load("lu-3spu-2rpu-r")
+        >>> natural = {"alpha": 0.1, "p": -0.3, "h": 0.6, "beta": 0.8, "gamma": 0.6}
+        >>> mech.state(natural, {"h": 0.05}).twist.round(4).tolist()
+        [0.0, -0.005, 0.0498, 0.0, 0.0, 0.0]
+        >>> impossible = mech.state({"x": 0.0, "y": 0.4, "z": 0.7, "alpha": 0.0, "beta": 0.3})
+        >>> pp.Status(impossible.status).name
+        'NO_BRANCH'
         """
         if branch not in (-1, +1):
             raise CoordinateError(f"branch is {branch!r}; must be +1 or -1, the sign of sin γ")
@@ -461,7 +317,13 @@ class Mechanism:
     # --- kinematics --------------------------------------------------------------------------------------
 
     def inverse_kinematics(self, pose: ArrayLike) -> InverseKinematics:
-        """Lengths, vectors and directions of the legs at a pose [Eq. 3]."""
+        """Lengths, vectors and directions of the legs at a pose (..., 4, 4) [Eq. 3].
+
+        >>> import polypod as pp
+        >>> mech = pp.load("lu-3spu-2rpu-r")
+        >>> mech.inverse_kinematics(mech.home).lengths.round(4).tolist()
+        [0.7487, 0.7441, 0.7487, 0.7544, 0.7544]
+        """
         shape, (poses,) = self._batch(pose=(pose, (4, 4)))
         return InverseKinematics(**_shaped(self._core.inverse_kinematics(poses), shape))
 
@@ -528,6 +390,12 @@ class Mechanism:
             acceleration: (..., 6).
             wrench: load on the platform at o, (..., 6), N and N m; the mechanism's own by default.
             wrench_axes: the axes of `wrench`, "base" or "platform".
+
+        >>> import numpy as np, polypod as pp
+        >>> mech = pp.load("lu-3spu-2rpu-r")
+        >>> pose = mech.pose({"alpha": 0.1, "p": -0.3, "h": 0.6, "beta": 0.8, "gamma": 0.6})
+        >>> mech.inverse_dynamics(pose, np.zeros(6), np.zeros(6)).forces.round().tolist()
+        [-13151.0, 9809.0, -4907.0, -1993.0, 10231.0]
         """
         shape, args = self._loaded_states(pose, twist, acceleration, wrench, wrench_axes)
         return InverseDynamics(**_shaped(self._core.inverse_dynamics(*args), shape))
@@ -657,6 +525,10 @@ def list_mechanisms() -> tuple[str, ...]:
 
 def load(source: str | Path) -> Mechanism:
     """The mechanism of a file, or a built-in one by its name.
+
+    >>> import polypod as pp
+    >>> pp.load("lu-3spu-2rpu-r")
+    <Mechanism lu-3spu-2rpu-r: RPU+SPU+RPU+SPU+SPU, 5 freedoms>
 
     Raises:
         MechanismError: everything wrong with the file, each with its place.

@@ -20,8 +20,9 @@ from matplotlib.patches import FancyBboxPatch
 from mpl_toolkits.mplot3d import Axes3D  # type: ignore[import-untyped]
 from numpy.typing import ArrayLike, NDArray
 
+from polypod.answers import Mobility
 from polypod.errors import PolypodError, ShapeError
-from polypod.mechanism import Mechanism, Mobility
+from polypod.mechanism import Mechanism
 from polypod.results import Solution
 from polypod.scene import Scene, draw, frame, joint_handles, math_name
 from polypod.status import Status, count

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from scipy.integrate import cumulative_simpson
 
 from polypod import _core
-from polypod.mechanism import Mechanism, State
+from polypod.answers import State
+from polypod.mechanism import Mechanism
 from polypod.motion import Motion
 from polypod.results import Solution
 from polypod.status import Status
@@ -95,6 +96,12 @@ def solve(mech: Mechanism, motion: Motion, *, progress: Callable[[int, int], Non
 
     Returns:
         A `Solution`, whose dataset has one variable for each quantity, SI, and the `Status` of every state.
+
+    >>> import polypod as pp
+    >>> mech = pp.load("lu-3spu-2rpu-r")
+    >>> solution = pp.solve(mech, pp.load_motion("lu-3spu-2rpu-r", mech))
+    >>> dict(solution.dataset.force.sizes)
+    {'time': 801, 'leg': 5}
     """
     state = mech.state(
         motion.coordinates, motion.rates, motion.second_rates, branch=motion.branch, continued=True

@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from polypod.mechanism import Mechanism, Mobility
+from polypod.answers import Mobility
+from polypod.mechanism import Mechanism
 from polypod.results import Solution
 from polypod.status import Status, count
 

@@ -1,0 +1,197 @@
+"""What a mechanism answers: named arrays over a batch of states, SI, base axes; and its mobility.
+
+The shapes are written with n legs, k rods or constraints, and `...` for the batch. Every answer has a `Status`
+per state.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Codes = NDArray[np.uint8]
+
+
+class State(NamedTuple):
+    """A platform's motion, and all numbers of its coordinate set."""
+
+    pose: Array
+    """(..., 4, 4)."""
+    twist: Array
+    """(..., 6): v of o in m/s, ω in rad/s."""
+    acceleration: Array
+    """(..., 6): a of o in m/s^2, ε in rad/s^2."""
+    coordinates: dict[str, Array]
+    """Given and dependent ones, m and rad."""
+    coordinate_rates: dict[str, Array]
+    coordinate_second_rates: dict[str, Array]
+    status: Codes
+
+
+class InverseKinematics(NamedTuple):
+    """Legs at a pose [Eq. 3]."""
+
+    lengths: Array
+    """(..., n), m."""
+    vectors: Array
+    """(..., n, 3): r from B to b, m."""
+    directions: Array
+    """(..., n, 3): δ."""
+    status: Codes
+
+
+class Kinematics(NamedTuple):
+    """Motion of legs, rods, links and joints [Eq. 2-39], base axes, SI."""
+
+    lengths: Array
+    """(..., n): ℓ, m [Eq. 3]."""
+    rates: Array
+    """(..., n): ℓ', m/s [Eq. 6]."""
+    accelerations: Array
+    """(..., n): ℓ'', m/s^2 [Eq. 15]."""
+    directions: Array
+    """(..., n, 3): δ."""
+    leg_omega: Array
+    """(..., n, 3): rad/s [Eq. 26, 33]."""
+    leg_eps: Array
+    """(..., n, 3): rad/s^2 [Eq. 28, 35]."""
+    leg_spin: Array
+    """(..., n): share of the leg's angular velocity along δ, rad/s [T6]."""
+    leg_spin_rate: Array
+    """(..., n): its rate, rad/s^2."""
+    piston_velocity: Array
+    """(..., n, 3): of the piston's mass centre, m/s [Eq. 38]."""
+    piston_acceleration: Array
+    """(..., n, 3): m/s^2 [Eq. 39]."""
+    cylinder_velocity: Array
+    """(..., n, 3): of the cylinder's mass centre, m/s [Eq. 38]."""
+    cylinder_acceleration: Array
+    """(..., n, 3): m/s^2 [Eq. 39]."""
+    base_joint_angles: Array
+    """(..., n, 2): leg against base, zero at home: about the base's axis, then about n, rad; NaN where none."""
+    base_joint_rates: Array
+    """(..., n, 2): their rates, rad/s [Eq. 24, 25]."""
+    platform_joint_angles: Array
+    """(..., n, 2): platform against leg, zero at home: about the platform's axis, then about n, rad [Eq. 29]."""
+    platform_joint_rates: Array
+    """(..., n, 2): their rates, rad/s [Eq. 32]."""
+    base_cone_angle: Array
+    """(..., n): between leg and cone axis of the base joint, rad."""
+    platform_cone_angle: Array
+    """(..., n): between leg and cone axis of the platform joint, rad."""
+    rod_angle: Array
+    """(..., k): turn of each rod about its line, zero at home, rad."""
+    rod_omega: Array
+    """(..., k, 3): rad/s [Eq. 36]."""
+    rod_eps: Array
+    """(..., k, 3): rad/s^2 [Eq. 37]."""
+    status: Codes
+    """(...): `Status`."""
+
+
+class InverseDynamics(NamedTuple):
+    """What balances a motion [Eq. 43]."""
+
+    forces: Array
+    """(..., n): active forces, N, positive when they push the platform away; zero for passive legs."""
+    constraint: Array
+    """(..., k): multipliers of the independent constraints; f_c in N for the paper's mechanism."""
+    status: Codes
+
+
+class CoupledForces(NamedTuple):
+    """Forces of two legs on one rod, and the torque on the rod [T16]."""
+
+    legs: tuple[str, str]
+    forces: Array
+    """(..., 2): f_c1 and f_c3 on the platform at b_1 and b_3 along c_1 = r_1×L/|r_1×L|, N.
+
+    As printed, f_c3 is along c_3 = -c_1.
+    """
+    torque: Array
+    """(...): T_c about the rod's line, N m."""
+    status: Codes
+
+
+class Power(NamedTuple):
+    """Energies and powers of a motion [T17]; W and J."""
+
+    kinetic: Array
+    potential: Array
+    kinetic_rate: Array
+    potential_rate: Array
+    actuators: Array
+    load: Array
+    damping: Array
+    friction: Array
+    """Power that the efficiency η stands for, negative where it takes."""
+    residual: Array
+    """actuators + load + damping + friction - kinetic_rate - potential_rate: zero up to rounding."""
+    status: Codes
+
+
+class Conditioning(NamedTuple):
+    """Singular values of the leg Jacobian on the twists that the constraints allow [T24]; pure numbers."""
+
+    sigma_min: Array
+    sigma_max: Array
+    condition: Array
+    status: Codes
+
+
+@dataclass(frozen=True)
+class GraphLink:
+    """A link of the topology graph; `joints` are indices."""
+
+    name: str
+    joints: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class GraphJoint:
+    """A joint of the topology graph between two links."""
+
+    kind: str
+    name: str
+    links: tuple[int, int]
+
+
+@dataclass(frozen=True)
+class Published:
+    """The accounting that the mechanism's publication gives."""
+
+    dof: int
+    redundant: int
+    passive: int
+
+
+@dataclass(frozen=True)
+class Mobility:
+    """Freedoms of the mechanism from ranks at generic poses, in the terms of Eq. 1 [T18]."""
+
+    dof: int
+    links: int
+    joints: int
+    joint_freedoms: int
+    loops: int
+    closure_rank: int
+    redundant: int
+    """Loop-closure equations that say nothing new: ς of Eq. 1."""
+    redundant_legs: tuple[str, ...]
+    """The legs whose constraints they couple."""
+    passive: int
+    """Freedoms that leave the platform where it is: M_0 of Eq. 1."""
+    passive_legs: tuple[str, ...]
+    uncontrolled: int
+    """Freedoms that remain at generic poses with all actuators locked: zero unless the design is singular."""
+    constraint_rows: tuple[tuple[str, str], ...]
+    """Leg and kind (A-E) of every scalar constraint."""
+    independent_rows: tuple[int, ...]
+    """Indices of those that are independent."""
+    graph_links: tuple[GraphLink, ...]
+    graph_joints: tuple[GraphJoint, ...]
+    published: Published | None
