@@ -1,7 +1,7 @@
 """What a mechanism answers: named arrays over a batch of states, SI, base axes; and its mobility.
 
-The shapes are written with n legs, k rods or constraints, and `...` for the batch. Every answer has a `Status`
-per state.
+The shapes are written with n legs, k rods or constraints, and `...` for the batch. Every answer has a
+`Status` per state.
 """
 
 from __future__ import annotations
@@ -72,11 +72,11 @@ class Kinematics(NamedTuple):
     cylinder_acceleration: Array
     """(..., n, 3): m/s^2 [Eq. 39]."""
     base_joint_angles: Array
-    """(..., n, 2): leg against base, zero at home: about the base's axis, then about n, rad; NaN where none."""
+    """(..., n, 2): leg against base, zero at home, rad: about the axis in the base, then n; or NaN."""
     base_joint_rates: Array
     """(..., n, 2): their rates, rad/s [Eq. 24, 25]."""
     platform_joint_angles: Array
-    """(..., n, 2): platform against leg, zero at home: about the platform's axis, then about n, rad [Eq. 29]."""
+    """(..., n, 2): platform against leg, zero at home, rad: about the axis in it, then n [Eq. 29]."""
     platform_joint_rates: Array
     """(..., n, 2): their rates, rad/s [Eq. 32]."""
     base_cone_angle: Array
