@@ -3,10 +3,12 @@
 
 use std::cmp::Ordering;
 
-use crate::constraint::{self, Constraint, ConstraintKind};
+use crate::constraint;
 use crate::leg;
-use crate::mechanism::{Body, Joint, Leg, Load, Mechanism, Rod, Side, Turning};
-use crate::mobility::{self, Mobility};
+use crate::mechanism::{
+    Body, Constraint, ConstraintKind, Joint, Leg, Load, Mechanism, Mobility, Rod, Side, Turning,
+};
+use crate::mobility;
 use crate::spatial::{Mat3, Pose, Vec3, Wrench};
 use crate::spec::{ANGLE_TOLERANCE, BodySpec, Fault, JointKind, JointSpec, LegSpec, RodSpec, Spec};
 

@@ -8,6 +8,7 @@ use crate::joints::{self, Zero};
 use crate::leg;
 use crate::mechanism::Mechanism;
 use crate::mobility;
+use crate::quadratic::quadratic;
 use crate::real::{Dual, Jet};
 use crate::singularity;
 use crate::spatial::{Acceleration, Mat3, Motion, Pose, Twist, Vec3, Wrench};
@@ -115,7 +116,7 @@ fn read_pose(mech: &Mechanism, poses: &[f64], i: usize) -> (Pose<f64>, Status) {
 
 /// Whether a pose satisfies the constraints.
 fn check_pose(mech: &Mechanism, pose: &Pose<f64>) -> Status {
-    let kept = mech.constraint_distance(pose) <= CONSTRAINT_TOLERANCE * mech.characteristic_length;
+    let kept = constraint::largest_distance(mech, pose) <= CONSTRAINT_TOLERANCE * mech.characteristic_length;
     if kept { Status::Ok } else { Status::OffConstraint }
 }
 
@@ -147,7 +148,7 @@ fn check_acceleration(
     let kept = mech.independent.iter().all(|c| {
         let row = constraint::row(c, pose);
         let size = constraint::row_size(&row, scale);
-        let g = row.power(&as_twist) + jacobian::quadratic(&constraint::hessian(c, pose), &twist.array());
+        let g = row.power(&as_twist) + quadratic(&constraint::hessian(c, pose), &twist.array());
         g.abs() <= CONSTRAINT_TOLERANCE * (second + speed * speed / scale) * size
     });
     match (second.is_finite(), kept) {

@@ -2,50 +2,11 @@
 //! the Jacobian) and its Hessian \[T9\]-\[T12\].
 
 use crate::leg;
-use crate::mechanism::{Leg, Side, Turning};
+use crate::mechanism::{Constraint, ConstraintKind, Joint, Leg, Mechanism, Partner};
+use crate::quadratic::{Hessian, add_centripetal, add_mixed, point_columns};
 use crate::real::Real;
 use crate::spatial::{Mat3, Pose, Vec3, Wrench};
 use crate::spec::JointKind;
-
-/// A 6×6 block of the Hessian, rows and columns as (v, ω).
-pub type Hessian<T> = [[T; 6]; 6];
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum ConstraintKind {
-    /// U below, U above: leg and both axes lie in one plane, `(l × r)·L = 0` \[Eq. 4\].
-    A,
-    /// R or F below: the leg is square to an axis of the base, `r·a_B = 0`.
-    B,
-    /// R or F above: the leg is square to an axis of the platform, `r·a_P = 0`.
-    C,
-    /// R or F against U, R or F: two axes are square, `a_B·a_P = 0`.
-    D,
-    /// Two legs on one rod: their planes through its line L keep their angle, `(Q r_1 × r)·L = 0`.
-    E,
-}
-
-#[derive(Clone, Copy, Debug)]
-pub struct Constraint {
-    pub kind: ConstraintKind,
-    pub leg: usize,
-    /// B in base axes and m in platform axes.
-    pub base_point: Vec3<f64>,
-    pub platform_point: Vec3<f64>,
-    /// Unit axes: L or a_B in base axes, l or a_P in platform axes; zero where the kind has none.
-    pub base_axis: Vec3<f64>,
-    pub platform_axis: Vec3<f64>,
-    /// Kind E only; of no effect elsewhere.
-    pub partner: Partner,
-}
-
-/// The first leg on the rod of a constraint of kind E.
-#[derive(Clone, Copy, Debug)]
-pub struct Partner {
-    pub base_point: Vec3<f64>,
-    pub platform_point: Vec3<f64>,
-    /// Q, the constant turn about L that takes the plane of the first leg into that of the second.
-    pub turn: Mat3<f64>,
-}
 
 const NO_PARTNER: Partner = Partner {
     base_point: Vec3 { x: 0.0, y: 0.0, z: 0.0 },
@@ -91,8 +52,7 @@ pub fn of_leg(index: usize, leg: &Leg) -> Vec<Constraint> {
                 let first = direction.unwrap_or_else(|| axis.perpendicular());
                 [first, axis.cross(first)]
             };
-            let fixed =
-                |joint: &crate::mechanism::Joint| joint.axis.filter(|_| joint.kind == JointKind::Fixed);
+            let fixed = |joint: &Joint| joint.axis.filter(|_| joint.kind == JointKind::Fixed);
             match (fixed(&leg.base), fixed(&leg.platform)) {
                 (None, None) => b.chain(two(m, None).map(|w| d(n, w))).collect(),
                 (Some(delta), None) => b.chain(two(n, Some(delta)).map(|w| d(w, m))).collect(),
@@ -140,7 +100,7 @@ enum Normal {
     Along(Vec3<f64>),
 }
 
-fn normal_of(kind: JointKind, joint: &crate::mechanism::Joint) -> Option<Normal> {
+fn normal_of(kind: JointKind, joint: &Joint) -> Option<Normal> {
     match kind {
         JointKind::Spherical => None,
         JointKind::Universal => joint.axis.map(Normal::Across),
@@ -255,42 +215,6 @@ pub fn hessian<T: Real>(constraint: &Constraint, pose: &Pose<T>) -> Hessian<T> {
     h
 }
 
-/// The columns of `v + ω×e` as a linear map of the twist.
-#[inline(always)]
-pub fn point_columns<T: Real>(e: Vec3<T>) -> [Vec3<T>; 6] {
-    let axes = Mat3::<T>::identity().0;
-    std::array::from_fn(|i| if i < 3 { axes[i] } else { axes[i - 3].cross(e) })
-}
-
-/// Adds the form `[ω×(ω×x)]·y = (ω·x)(ω·y) - (x·y) ω·ω`.
-#[inline(always)]
-pub fn add_centripetal<T: Real>(h: &mut Hessian<T>, x: Vec3<T>, y: Vec3<T>) {
-    let (xy, half) = (x.dot(y), T::lit(0.5));
-    let (x, y) = (x.array(), y.array());
-    for i in 0..3 {
-        for j in 0..3 {
-            h[3 + i][3 + j] = h[3 + i][3 + j] + (x[i] * y[j] + y[i] * x[j]) * half;
-        }
-        h[3 + i][3 + i] = h[3 + i][3 + i] - xy;
-    }
-}
-
-/// Adds the form `2 v_b·q(ω)` with `v_b = v + ω×e` and q linear.
-#[inline(always)]
-fn add_mixed<T: Real>(h: &mut Hessian<T>, e: Vec3<T>, q: impl Fn(Vec3<T>) -> Vec3<T>) {
-    let axes = Mat3::<T>::identity().0;
-    for (j, axis) in axes.into_iter().enumerate() {
-        let q = q(axis);
-        let (linear, angular) = (q.array(), e.cross(q).array());
-        for i in 0..3 {
-            h[i][3 + j] = h[i][3 + j] + linear[i];
-            h[3 + j][i] = h[3 + j][i] + linear[i];
-            h[3 + i][3 + j] = h[3 + i][3 + j] + angular[i];
-            h[3 + j][3 + i] = h[3 + j][3 + i] + angular[i];
-        }
-    }
-}
-
 /// Size of a row with its torque part divided by the length `scale`.
 #[must_use]
 pub fn row_size(row: &Wrench<f64>, scale: f64) -> f64 {
@@ -304,15 +228,9 @@ pub fn distance(c: &Constraint, pose: &Pose<f64>, scale: f64) -> f64 {
     value(c, pose).abs() / row_size(&row(c, pose), scale)
 }
 
-/// The unit axis behind a leg's frame in base axes, and whether it turns with the platform.
-#[inline(always)]
-pub fn turning_axis<T: Real>(turning: Turning, pose: &Pose<T>) -> (Vec3<T>, bool) {
-    match turning {
-        Turning::Across(Side::Platform, u) | Turning::Along(Side::Platform, u) => {
-            (pose.rotation * Vec3::lift(u), true)
-        }
-        Turning::Across(Side::Base, u) | Turning::Along(Side::Base, u) | Turning::Free(u) => {
-            (Vec3::lift(u), false)
-        }
-    }
+/// The largest distance by which a pose misses an independent constraint, m.
+#[must_use]
+pub fn largest_distance(mech: &Mechanism, pose: &Pose<f64>) -> f64 {
+    let distances = mech.independent.iter().map(|c| distance(c, pose, mech.characteristic_length));
+    distances.fold(0.0, |m, d| if d > m || d.is_nan() { d } else { m })
 }

@@ -4,9 +4,9 @@
 //! twist and acceleration exactly. Coordinates that a constraint makes dependent are solved first. This is the one
 //! place with trigonometry.
 
-use crate::constraint::{self, ConstraintKind};
+use crate::constraint;
 use crate::linear::{Solved, solve};
-use crate::mechanism::{MAX_CONSTRAINTS, Mechanism};
+use crate::mechanism::{Constraint, ConstraintKind, MAX_CONSTRAINTS, Mechanism};
 use crate::mobility::count;
 use crate::real::{Dual, Jet, Real, Trig};
 use crate::spatial::{Acceleration, Mat3, Motion, Pose, Twist, Vec3};
@@ -206,7 +206,7 @@ impl Plane {
             })
             .collect();
         let share = 1.0 / count(sharing.len());
-        let mean = |point: fn(&constraint::Constraint) -> Vec3<f64>| {
+        let mean = |point: fn(&Constraint) -> Vec3<f64>| {
             sharing.iter().map(|d| point(d)).fold(Vec3::zero(), |sum, p| sum + p) * share
         };
         Some(Plane {
@@ -451,7 +451,7 @@ fn solve_dependent(
 }
 
 /// What makes a constraint's value a pure number.
-fn unit(c: &constraint::Constraint, scale: f64) -> f64 {
+fn unit(c: &Constraint, scale: f64) -> f64 {
     if c.kind == ConstraintKind::D { 1.0 } else { scale }
 }
 

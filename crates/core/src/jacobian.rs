@@ -1,10 +1,11 @@
 //! The completed Jacobian and Hessian: rows of the actuated legs over rows of the independent constraints, and the
 //! solves with them.
 
-use crate::constraint::{self, Hessian};
+use crate::constraint;
 use crate::leg;
 use crate::linear::solve;
 use crate::mechanism::Mechanism;
+use crate::quadratic::{Hessian, quadratic};
 use crate::real::Real;
 use crate::spatial::{Acceleration, Pose, Twist, Wrench};
 
@@ -71,18 +72,6 @@ pub fn platform_acceleration<T: Real>(
     }
     let solved = solve(scaled_jacobian(mech, pose), rhs);
     (Acceleration::from_array(unscaled(mech, solved.x)), solved.pivots)
-}
-
-/// `vᵀ h v`.
-#[inline(always)]
-pub fn quadratic<T: Real>(h: &Hessian<T>, v: &[T; 6]) -> T {
-    let mut sum = T::zero();
-    for i in 0..6 {
-        for j in 0..6 {
-            sum = (v[i] * h[i][j]).mul_add(v[j], sum);
-        }
-    }
-    sum
 }
 
 #[inline(always)]

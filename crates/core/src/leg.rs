@@ -1,7 +1,7 @@
 //! One leg: where it is, how its platform end moves, how it turns, and how its links move.
 
-use crate::constraint::{Hessian, add_centripetal, point_columns, turning_axis};
-use crate::mechanism::{Leg, Turning};
+use crate::mechanism::{Leg, Side, Turning};
+use crate::quadratic::{Hessian, add_centripetal, point_columns};
 use crate::real::Real;
 use crate::spatial::{Mat3, Motion, Pose, Vec3, Wrench};
 
@@ -74,6 +74,19 @@ pub fn end<T: Real>(p: &Position<T>, platform: &Motion<T>) -> End<T> {
     let second = delta.dot(a_b) + v_b.dot(delta_rate);
     let delta_acceleration = (a_b - delta * second - delta_rate * (rate + rate)) * inverse;
     End { v_b, a_b, rate, acceleration: second, delta_rate, delta_acceleration }
+}
+
+/// The unit axis behind a leg's frame in base axes, and whether it turns with the platform.
+#[inline(always)]
+fn turning_axis<T: Real>(turning: Turning, pose: &Pose<T>) -> (Vec3<T>, bool) {
+    match turning {
+        Turning::Across(Side::Platform, u) | Turning::Along(Side::Platform, u) => {
+            (pose.rotation * Vec3::lift(u), true)
+        }
+        Turning::Across(Side::Base, u) | Turning::Along(Side::Base, u) | Turning::Free(u) => {
+            (Vec3::lift(u), false)
+        }
+    }
 }
 
 /// The leg's frame at a pose, and what the spin needs of it \[T5\].
@@ -195,14 +208,14 @@ pub fn carry<T: Real>(leg: &Leg, state: &State<T>, force: Vec3<T>, torque: Vec3<
     let (direction, turning) = match leg.turning {
         Turning::Across(side, _) => (f.w.cross(f.u) * about, (side, f.u.cross(p.delta.cross(f.w)) * about)),
         Turning::Along(side, _) => (Vec3::zero(), (side, f.u.cross(f.w) * about)),
-        Turning::Free(_) => (Vec3::zero(), (crate::mechanism::Side::Base, Vec3::zero())),
+        Turning::Free(_) => (Vec3::zero(), (Side::Base, Vec3::zero())),
     };
     let conjugate = torque.cross(p.delta) + direction;
     let across = conjugate - p.delta * p.delta.dot(conjugate);
     let wrench = Wrench::at(p.e, force + across * (T::one() / p.length));
     match turning {
-        (crate::mechanism::Side::Platform, couple) => wrench + Wrench::new(Vec3::zero(), couple),
-        (crate::mechanism::Side::Base, _) => wrench,
+        (Side::Platform, couple) => wrench + Wrench::new(Vec3::zero(), couple),
+        (Side::Base, _) => wrench,
     }
 }
 

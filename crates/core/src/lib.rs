@@ -14,6 +14,7 @@ pub mod leg;
 pub mod linear;
 pub mod mechanism;
 pub mod mobility;
+pub mod quadratic;
 pub mod real;
 pub mod singularity;
 pub mod spatial;

@@ -4,8 +4,8 @@
 //! Nothing here knows a mechanism's name: legs differ by their joints, and joints give the leg its
 //! [`Turning`] and its [`Constraint`]s.
 
-use crate::constraint::{self, Constraint};
-use crate::mobility::Mobility;
+use serde::Serialize;
+
 use crate::spatial::{Mat3, Pose, Vec3, Wrench};
 use crate::spec::{Axes, JointKind};
 
@@ -93,6 +93,97 @@ pub struct Load {
     pub axes: Axes,
 }
 
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ConstraintKind {
+    /// U below, U above: leg and both axes lie in one plane, `(l × r)·L = 0` \[Eq. 4\].
+    A,
+    /// R or F below: the leg is square to an axis of the base, `r·a_B = 0`.
+    B,
+    /// R or F above: the leg is square to an axis of the platform, `r·a_P = 0`.
+    C,
+    /// R or F against U, R or F: two axes are square, `a_B·a_P = 0`.
+    D,
+    /// Two legs on one rod: their planes through its line L keep their angle, `(Q r_1 × r)·L = 0`.
+    E,
+}
+
+#[derive(Clone, Copy, Debug)]
+pub struct Constraint {
+    pub kind: ConstraintKind,
+    pub leg: usize,
+    /// B in base axes and m in platform axes.
+    pub base_point: Vec3<f64>,
+    pub platform_point: Vec3<f64>,
+    /// Unit axes: L or a_B in base axes, l or a_P in platform axes; zero where the kind has none.
+    pub base_axis: Vec3<f64>,
+    pub platform_axis: Vec3<f64>,
+    /// Kind E only; of no effect elsewhere.
+    pub partner: Partner,
+}
+
+/// The first leg on the rod of a constraint of kind E.
+#[derive(Clone, Copy, Debug)]
+pub struct Partner {
+    pub base_point: Vec3<f64>,
+    pub platform_point: Vec3<f64>,
+    /// Q, the constant turn about L that takes the plane of the first leg into that of the second.
+    pub turn: Mat3<f64>,
+}
+
+/// A link of the topology graph with the numbers of its joints.
+#[derive(Clone, Debug, Serialize)]
+pub struct GraphLink {
+    pub name: String,
+    pub joints: Vec<usize>,
+}
+
+/// A joint of the topology graph between two links.
+#[derive(Clone, Debug, Serialize)]
+pub struct GraphJoint {
+    pub kind: &'static str,
+    pub name: String,
+    pub links: [usize; 2],
+}
+
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct Graph {
+    pub links: Vec<GraphLink>,
+    pub joints: Vec<GraphJoint>,
+}
+
+/// The accounting of [Eq. 1], from ranks.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct Mobility {
+    pub dof: usize,
+    pub links: usize,
+    pub joints: usize,
+    /// Sum of the joints' freedoms.
+    pub joint_freedoms: usize,
+    pub loops: usize,
+    /// Rank of the loop closures, at most six for each loop.
+    pub closure_rank: usize,
+    /// Closure equations that say nothing new.
+    pub redundant: usize,
+    /// Legs (from 0) whose constraints the redundant ones couple.
+    pub redundant_legs: Vec<usize>,
+    /// Freedoms that leave the platform where it is.
+    pub passive: usize,
+    /// Legs (from 0) that have them.
+    pub passive_legs: Vec<usize>,
+    /// Freedoms that remain at generic poses when all actuators are locked: zero unless the design itself is singular.
+    pub uncontrolled: usize,
+    /// Scalar constraints of the legs: leg (from 0) and kind, and whether it is one of the independent ones.
+    pub constraints: Vec<ConstraintRow>,
+    pub graph: Graph,
+}
+
+#[derive(Clone, Debug, Serialize)]
+pub struct ConstraintRow {
+    pub leg: usize,
+    pub kind: String,
+    pub independent: bool,
+}
+
 #[derive(Clone, Debug)]
 pub struct Mechanism {
     pub name: String,
@@ -128,14 +219,5 @@ impl Mechanism {
     /// Legs with an actuator, in the order of the Jacobian's rows.
     pub fn actuated(&self) -> impl Iterator<Item = (usize, &Leg)> {
         self.legs.iter().enumerate().filter(|(_, leg)| leg.actuated)
-    }
-
-    /// The largest distance by which `pose` misses an independent constraint, m.
-    #[must_use]
-    pub fn constraint_distance(&self, pose: &Pose<f64>) -> f64 {
-        self.independent
-            .iter()
-            .map(|c| constraint::distance(c, pose, self.characteristic_length))
-            .fold(0.0, |m, d| if d > m || d.is_nan() { d } else { m })
     }
 }

@@ -4,68 +4,14 @@
 //! Ranks are taken at several generic poses, reached from the home pose by steps of about a third of the
 //! mechanism's size, and the largest counts: at a singular pose a rank only drops.
 
-use nalgebra::{DMatrix, DVector};
-use serde::Serialize;
-
-use crate::constraint::{self, Constraint};
+use crate::constraint;
 use crate::leg;
-use crate::mechanism::{Leg, Mechanism, Side, Turning};
+use crate::mechanism::{
+    Constraint, ConstraintRow, Graph, GraphJoint, GraphLink, Leg, Mechanism, Mobility, Side, Turning,
+};
 use crate::spatial::{Mat3, Pose, Vec3, Wrench};
 use crate::spec::JointKind;
-
-/// A link of the topology graph with the numbers of its joints.
-#[derive(Clone, Debug, Serialize)]
-pub struct GraphLink {
-    pub name: String,
-    pub joints: Vec<usize>,
-}
-
-/// A joint of the topology graph between two links.
-#[derive(Clone, Debug, Serialize)]
-pub struct GraphJoint {
-    pub kind: &'static str,
-    pub name: String,
-    pub links: [usize; 2],
-}
-
-#[derive(Clone, Debug, Default, Serialize)]
-pub struct Graph {
-    pub links: Vec<GraphLink>,
-    pub joints: Vec<GraphJoint>,
-}
-
-/// The accounting of [Eq. 1], from ranks.
-#[derive(Clone, Debug, Default, Serialize)]
-pub struct Mobility {
-    pub dof: usize,
-    pub links: usize,
-    pub joints: usize,
-    /// Sum of the joints' freedoms.
-    pub joint_freedoms: usize,
-    pub loops: usize,
-    /// Rank of the loop closures, at most six for each loop.
-    pub closure_rank: usize,
-    /// Closure equations that say nothing new.
-    pub redundant: usize,
-    /// Legs (from 0) whose constraints the redundant ones couple.
-    pub redundant_legs: Vec<usize>,
-    /// Freedoms that leave the platform where it is.
-    pub passive: usize,
-    /// Legs (from 0) that have them.
-    pub passive_legs: Vec<usize>,
-    /// Freedoms that remain at generic poses when all actuators are locked: zero unless the design itself is singular.
-    pub uncontrolled: usize,
-    /// Scalar constraints of the legs: leg (from 0) and kind, and whether it is one of the independent ones.
-    pub constraints: Vec<ConstraintRow>,
-    pub graph: Graph,
-}
-
-#[derive(Clone, Debug, Serialize)]
-pub struct ConstraintRow {
-    pub leg: usize,
-    pub kind: String,
-    pub independent: bool,
-}
+use nalgebra::{DMatrix, DVector};
 
 /// Singular values below this share of the largest count as zero.
 const RANK_TOLERANCE: f64 = 1e-9;

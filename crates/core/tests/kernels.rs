@@ -10,6 +10,7 @@ use polypod_core::dynamics;
 use polypod_core::jacobian;
 use polypod_core::leg;
 use polypod_core::mechanism::Mechanism;
+use polypod_core::quadratic;
 use polypod_core::real::{Dual, F, Real};
 use polypod_core::spatial::{Acceleration, Mat3, Motion, Pose, Twist, Vec3, Wrench};
 
@@ -172,9 +173,9 @@ fn rows_and_hessians_are_the_derivatives_of_values() {
             state.acceleration = Acceleration::new(draw.vector(), draw.vector());
             let jet = moving(&state);
             let v = state.twist.array();
-            let total = |row: Wrench<f64>, h: &constraint::Hessian<f64>| {
+            let total = |row: Wrench<f64>, h: &quadratic::Hessian<f64>| {
                 let a = Twist::new(state.acceleration.a, state.acceleration.eps);
-                Vec3::new(row.power(&state.twist), row.power(&a) + jacobian::quadratic(h, &v), 0.0)
+                Vec3::new(row.power(&state.twist), row.power(&a) + quadratic::quadratic(h, &v), 0.0)
             };
             for c in &mech.constraints {
                 let g = constraint::value(c, &jet);
@@ -194,7 +195,7 @@ fn rows_and_hessians_are_the_derivatives_of_values() {
     }
 }
 
-fn symmetric(h: &constraint::Hessian<f64>) {
+fn symmetric(h: &quadratic::Hessian<f64>) {
     for i in 0..6 {
         for j in 0..i {
             assert!((h[i][j] - h[j][i]).abs() <= 1e-14, "h[{i}][{j}]");
