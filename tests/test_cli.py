@@ -303,3 +303,29 @@ def test_usage_errors(run, args):
     assert status == 2
     assert "Usage" in out + err
     assert "Traceback" not in out + err
+
+
+THREE_ROWS = "time [s], z [mm], rx [deg], ry [deg]\n0, 500, 0, 0\n1, 510, 1, 1\n2, 500, 0, 0\n"
+
+
+def test_solve_does_not_overwrite_its_own_input(run, tmp_path):
+    motion = tmp_path / "motion.csv"
+    motion.write_text(THREE_ROWS)
+    result = run("solve", str(DATA / "3-rps.toml"), str(motion), "-o", str(motion))
+    assert_one_message(result, "is an input")
+    assert motion.read_text() == THREE_ROWS
+
+
+def test_samples_go_between_the_rows_of_a_file(run, tmp_path):
+    motion, output = tmp_path / "motion.csv", tmp_path / "out.nc"
+    motion.write_text(THREE_ROWS)
+    run("solve", str(DATA / "3-rps.toml"), str(motion), "-o", str(output), "--samples", "41")
+    time = pp.load_solution(output).dataset.time.to_numpy()
+    np.testing.assert_allclose(time, np.linspace(0.0, 2.0, 41))
+
+
+def test_info_draws_the_mechanism(run, tmp_path):
+    figure = tmp_path / "machine.png"
+    run("info", str(DATA / "3-rps.toml"), "--draw", str(figure))
+    assert figure.read_bytes().startswith(b"\x89PNG")
+    assert figure.stat().st_size > 10_000

@@ -468,7 +468,8 @@ def test_names_that_are_no_set_are_answered_with_the_valid_ones() -> None:
     ):
         LU.state({"x": 0.0, "y": 0.0})
     with pytest.raises(
-        CoordinateError, match=r"no coordinate set with no names; valid: .*pose: any 5 of x, y, z"
+        CoordinateError,
+        match=r"no coordinate set with no names; valid: .*pose: 5 independent ones of x, y, z",
     ):
         LU.state({})
     with pytest.raises(CoordinateError, match="gamma"):

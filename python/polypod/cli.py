@@ -98,16 +98,34 @@ def demo(
 
 
 @app.command(epilog="Example: [bold]polypod info lu-3spu-2rpu-r[/bold]")
-def info(mechanism: MechanismArgument, as_json: JsonOption = False) -> None:
+def info(
+    mechanism: MechanismArgument,
+    as_json: JsonOption = False,
+    draw: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Draw the mechanism at its centre pose into a .png or .svg file."),
+    ] = None,
+) -> None:
     """Tell what a mechanism is: freedoms, joints, constraints, coordinates, conditioning, warnings."""
     from polypod.mechanism import load
     from polypod.summary import describe
 
-    facts = describe(load(mechanism))
+    mech = load(mechanism)
+    facts = describe(mech)
+    if draw is not None:
+        _draw(mech, draw)
     if as_json:
         _print_json(facts)
     else:
         _print_mechanism(_console(), facts)
+
+
+def _draw(mech: Mechanism, path: Path) -> None:
+    from matplotlib.figure import Figure
+
+    from polypod.plots import plot_poses, save_figure
+
+    save_figure(plot_poses(mech, {"centre pose": mech.home}, Figure(figsize=(6.0, 6.0))), path)
 
 
 def _print_mechanism(out: Console, facts: dict[str, Any]) -> None:
@@ -116,11 +134,10 @@ def _print_mechanism(out: Console, facts: dict[str, Any]) -> None:
     if facts["source"]:
         out.print(f"[dim]{escape(facts['source'])}[/dim]")
 
-    legs = _table("Legs", "leg", "joints", "actuated", "stroke / mm>")
+    legs = _table("Legs", "leg", "joints", "actuated", "length at home / mm>", "stroke / mm>")
     for leg in facts["legs"]:
-        legs.add_row(
-            escape(leg["name"]), leg["joints"], "yes" if leg["actuated"] else "no", _range_mm(leg["stroke"])
-        )
+        actuated, home = "yes" if leg["actuated"] else "no", _f(leg["home_length"], 1e3)
+        legs.add_row(escape(leg["name"]), leg["joints"], actuated, home, _range_mm(leg["stroke"]))
     out.print(legs)
 
     table = _table("Mobility, from ranks at generic poses", "", ">", "")
@@ -166,7 +183,11 @@ def _print_mechanism(out: Console, facts: dict[str, Any]) -> None:
 
     sets = _table("Coordinate sets", "set", "coordinates")
     for name, coordinates in facts["coordinate_sets"].items():
-        of = f"any {mobility['dof']} of " if name == "pose" and len(coordinates) > mobility["dof"] else ""
+        of = (
+            f"{mobility['dof']} independent ones of "
+            if name == "pose" and len(coordinates) > mobility["dof"]
+            else ""
+        )
         sets.add_row(name, of + ", ".join(coordinates))
     out.print(sets)
 
@@ -210,19 +231,32 @@ def solve(
             "-o", "--output", metavar="RESULT", help="File for the results: .nc or .csv; it is overwritten."
         ),
     ],
+    samples: Annotated[
+        int | None,
+        typer.Option(
+            min=2,
+            metavar="N",
+            help="Solve at N instants evenly over the motion instead of at its own.",
+        ),
+    ] = None,
     as_json: JsonOption = False,
 ) -> None:
     """Solve a mechanism along a motion: kinematics, forces, power and conditioning, saved in RESULT.
 
     The exit status is 1 if some states have no answer.
     """
+    import numpy as np
+
     from polypod.mechanism import load
     from polypod.motion import load_motion
     from polypod.summary import summarise
 
-    _check_result_path(result)
+    _check_result_path(result, mechanism, motion)
     mech = load(mechanism)
-    solution = _solve_with_progress(mech, load_motion(motion, mech))
+    path = load_motion(motion, mech)
+    if samples is not None:
+        path = path.sample(np.linspace(path.time[0], path.time[-1], samples))
+    solution = _solve_with_progress(mech, path)
     solution.save(result)
     facts = summarise(mech, solution)
     if as_json:
@@ -234,12 +268,14 @@ def solve(
         raise typer.Exit(1)
 
 
-def _check_result_path(path: Path) -> None:
+def _check_result_path(path: Path, *inputs: str) -> None:
     """Before any work: what would fail after it."""
     from polypod.errors import SolutionError
 
     if path.suffix not in RESULT_SUFFIXES:
         raise SolutionError(f"{path} ends in {path.suffix!r}; a result's file ends in .nc or .csv")
+    if path.exists() and any(Path(name).exists() and path.samefile(name) for name in inputs):
+        raise SolutionError(f"{path} is an input; the result would overwrite it, give it another name")
     if path.is_dir():
         raise SolutionError(f"{path} is a directory; the result needs a file")
     if not path.parent.is_dir():
@@ -259,6 +295,13 @@ def _solve_with_progress(mech: Mechanism, motion: Motion) -> Solution:
         return solve_motion(mech, motion, progress=progress)
 
 
+def _length_mm(leg: dict[str, Any]) -> str:
+    """The lengths that a leg passes, marked where they leave its stroke."""
+    if leg["length"][0] is None:
+        return "none"
+    return _range_mm(leg["length"]) + (" outside" if leg["outside_stroke"] else "")
+
+
 def _print_solution(out: Console, facts: dict[str, Any]) -> None:
     out.print(
         f"[bold]{escape(facts['mechanism'])}[/bold] along [bold]{escape(facts['motion'])}[/bold] "
@@ -269,7 +312,7 @@ def _print_solution(out: Console, facts: dict[str, Any]) -> None:
     legs = _table("Legs", "leg", "length / mm>", "stroke / mm>", "peak speed / mm/s>", "peak force / N>")
     for leg in facts["legs"]:
         peaks = (_f(leg["peak_rate"], 1e3), _f(leg["peak_force"]))
-        legs.add_row(escape(leg["name"]), _range_mm(leg["length"]), _range_mm(leg["stroke"]), *peaks)
+        legs.add_row(escape(leg["name"]), _length_mm(leg), _range_mm(leg["stroke"]), *peaks)
     out.print(legs)
 
     whole = _table("Along the motion", "", ">")

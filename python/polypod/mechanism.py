@@ -180,6 +180,13 @@ class Mechanism:
                 "The platform can move there with hardly any change of the leg lengths, and forces are "
                 "large; stay clear of it."
             )
+        lengths = self.inverse_kinematics(self.home).lengths
+        for name, length, (least, greatest) in zip(self.leg_names, lengths, self.stroke, strict=True):
+            if not least <= length <= greatest:
+                notes.append(
+                    f"leg {name} is {1e3 * length:.1f} mm long at the centre pose, outside its stroke of "
+                    f"{1e3 * least:.1f} to {1e3 * greatest:.1f} mm."
+                )
         if mobility.redundant:
             legs = " and ".join(mobility.redundant_legs)
             notes.append(
@@ -264,7 +271,7 @@ class Mechanism:
         for extra, kind in zip(series[1:], ("rates", "second_rates"), strict=True):
             for name in extra:
                 if name not in coordinates:
-                    raise CoordinateError(f"{kind} of {name!r}; {alternatives(name, coordinates)}")
+                    raise CoordinateError(f"{kind} has {name!r}; {alternatives(name, coordinates)}")
         flat = [_number(name, s.get(name, 0.0)) for name in coordinates for s in series]
         guess_array = None if guess is None else _array("guess", guess, (4, 4))
         shape = _broadcast(*(a.shape for a in flat), () if guess_array is None else guess_array.shape[:-2])
@@ -305,13 +312,18 @@ class Mechanism:
         for set, names in self.coordinate_sets.items():
             if given == {*names} or (set == "pose" and given <= {*names} and len(given) == self.dof):
                 return set
+        known = sorted({name for names in self.coordinate_sets.values() for name in names})
+        unknown = [
+            f"{name!r} is none: {alternatives(str(name), known)}" for name in coordinates if name not in known
+        ]
+        some = "" if self.dof == 6 else f"{self.dof} independent ones of "
         choices = "; ".join(
-            f"{set}: {'any ' + str(self.dof) + ' of ' if set == 'pose' else ''}{', '.join(names)}"
+            f"{set}: {some if set == 'pose' else ''}{', '.join(names)}"
             for set, names in self.coordinate_sets.items()
         )
         raise CoordinateError(
             f"{self.name} has no coordinate set with {', '.join(map(str, coordinates)) or 'no names'}; "
-            f"valid: {choices}"
+            f"valid: {choices}" + "".join(f"\n  {message}" for message in unknown)
         )
 
     # --- kinematics --------------------------------------------------------------------------------------

@@ -49,7 +49,7 @@ class Solution:
             with _replacing(path) as temporary:
                 write(self.dataset, temporary)
         except OSError as error:
-            raise SolutionError(f"{path} cannot be written: {error}") from error
+            raise SolutionError(f"{path} cannot be written: {error.strerror or error}") from error
 
 
 def load_solution(path: str | PathLike[str]) -> Solution:

@@ -55,15 +55,22 @@ def describe(mech: Mechanism) -> dict[str, Any]:
     """All that `polypod info` tells about a mechanism."""
     mobility, file = mech.mobility(), mech.to_dict()
     centre = mech.conditioning(mech.home)
-    legs = zip(mech.leg_names, mech.leg_letters, mech.actuated, mech.stroke, strict=True)
+    home = mech.inverse_kinematics(mech.home).lengths
+    legs = zip(mech.leg_names, mech.leg_letters, mech.actuated, home, mech.stroke, strict=True)
     return {
         "name": mech.name,
         "description": file.get("description", ""),
         "source": file.get("source", ""),
         "units": "SI, rad",
         "legs": [
-            {"name": name, "joints": letters, "actuated": bool(actuated), "stroke": _numbers(stroke)}
-            for name, letters, actuated, stroke in legs
+            {
+                "name": name,
+                "joints": letters,
+                "actuated": bool(actuated),
+                "home_length": float(length),
+                "stroke": _numbers(stroke),
+            }
+            for name, letters, actuated, length, stroke in legs
         ],
         "mobility": {term: getattr(mobility, term) for term in _MOBILITY},
         "accounting": accounting(mobility),
@@ -134,6 +141,7 @@ def summarise(mech: Mechanism, solution: Solution) -> dict[str, Any]:
             "name": name,
             "length": [_least(of("length")[:, i]), _greatest(of("length")[:, i])],
             "stroke": _numbers(mech.stroke[i]),
+            "outside_stroke": _outside(of("length")[:, i], mech.stroke[i]),
             "peak_rate": _peak(of("rate")[:, i]),
             "peak_force": _peak(of("force")[:, i]),
         }
@@ -208,6 +216,10 @@ def _coupled(solution: Solution) -> dict[str, Any] | None:
 
 
 # --- numbers that exist -------------------------------------------------------------------------------------
+
+
+def _outside(lengths: Array, stroke: Array) -> bool:
+    return bool(np.any((lengths < stroke[0]) | (lengths > stroke[1])))
 
 
 def _number(value: ArrayLike) -> float | None:

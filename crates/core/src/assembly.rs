@@ -228,7 +228,10 @@ fn check_leg_at_home(spec: &Spec, place: &str, leg: &LegSpec, home: &Pose<f64>) 
             let key = if joint.rod.is_some() { "rod" } else { "axis" };
             faults.push(Fault::new(
                 format!("{place}.{side}.{key}"),
-                format!("makes {degrees:.4} degrees with the leg at the home pose; {need}"),
+                format!(
+                    "makes {degrees:.4} degrees with the leg at the home pose; {need}: correct the axis, the points or \
+                     the home pose"
+                ),
             ));
         }
     }

@@ -60,7 +60,8 @@ impl Status {
                 "a leg is outside its stroke; the numbers stand, the machine cannot reach the pose"
             }
             Status::OffConstraint => {
-                "the pose, twist or acceleration breaks a constraint of the mechanism; make it with mech.state(...)"
+                "the pose, twist or acceleration breaks a constraint of the mechanism; give only as many coordinates as it \
+                 has freedoms, so that the others follow (mech.state makes pose, twist and acceleration)"
             }
             Status::BranchJump => {
                 "between the state before and this one the dependent coordinates passed a fold and came out on \
