@@ -475,7 +475,7 @@ def test_names_that_are_no_set_are_answered_with_the_valid_ones() -> None:
     with pytest.raises(CoordinateError, match="gamma"):
         LU.state(at_cosine(0.5) | {"gamma": 1.0})
     with pytest.raises(
-        CoordinateError, match=r"3-rps has no coordinate set with .*any 3 of x, y, z, rx, ry, rz"
+        CoordinateError, match=r"3-rps has no coordinate set with .*3 independent ones of x, y, z, rx, ry, rz"
     ):
         RPS.state({"z": 0.5, "rx": 0.0})
     with pytest.raises(CoordinateError, match="rates of 'betta'; did you mean \"beta\""):
