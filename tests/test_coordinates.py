@@ -478,9 +478,9 @@ def test_names_that_are_no_set_are_answered_with_the_valid_ones() -> None:
         CoordinateError, match=r"3-rps has no coordinate set with .*3 independent ones of x, y, z, rx, ry, rz"
     ):
         RPS.state({"z": 0.5, "rx": 0.0})
-    with pytest.raises(CoordinateError, match="rates of 'betta'; did you mean \"beta\""):
+    with pytest.raises(CoordinateError, match="rates: 'betta' is no coordinate given; did you mean \"beta\""):
         LU.state(at_cosine(0.5), {"betta": 1.0})
-    with pytest.raises(CoordinateError, match="second_rates of 'gamma'"):
+    with pytest.raises(CoordinateError, match="second_rates: 'gamma'"):
         LU.state(at_cosine(0.5), {}, {"gamma": 1.0})
     with pytest.raises(UnknownNameError, match='no coordinate set "papers"; did you mean "paper"'):
         LU.coordinates(LU.home, "papers")

@@ -271,7 +271,9 @@ class Mechanism:
         for extra, kind in zip(series[1:], ("rates", "second_rates"), strict=True):
             for name in extra:
                 if name not in coordinates:
-                    raise CoordinateError(f"{kind} has {name!r}; {alternatives(name, coordinates)}")
+                    raise CoordinateError(
+                        f"{kind}: {name!r} is no coordinate given; {alternatives(name, coordinates)}"
+                    )
         flat = [_number(name, s.get(name, 0.0)) for name in coordinates for s in series]
         guess_array = None if guess is None else _array("guess", guess, (4, 4))
         shape = _broadcast(*(a.shape for a in flat), () if guess_array is None else guess_array.shape[:-2])
