@@ -32,6 +32,7 @@ from polypod.answers import (
 )
 from polypod.errors import CoordinateError, Fault, MechanismError, ShapeError, UnknownNameError, alternatives
 from polypod.schema import read_spec
+from polypod.status import Status
 
 NEAR_SINGULAR = 0.01
 """Smallest singular value (a pure number) below which a pose is called nearly singular."""
@@ -187,11 +188,14 @@ class Mechanism:
                     f"leg {name} is {1e3 * length:.1f} mm long at the centre pose, outside its stroke of "
                     f"{1e3 * least:.1f} to {1e3 * greatest:.1f} mm."
                 )
+        if self.inverse_kinematics(self.home).status == Status.OUT_OF_CONE:
+            notes.append("a joint is beyond its cone limit at the centre pose.")
         if mobility.redundant:
-            legs = " and ".join(mobility.redundant_legs)
+            several = mobility.redundant > 1
             notes.append(
-                f"{mobility.redundant} redundant constraints couple legs {legs}: the parts must be made "
-                "accurately, and couples in these joints are statically indeterminate."
+                f"{mobility.redundant} redundant constraint{'s couple' if several else ' couples'} legs "
+                f"{' and '.join(mobility.redundant_legs)}: the parts must be made accurately, and couples in "
+                "these joints are statically indeterminate."
             )
         if mobility.passive:
             notes.append(
@@ -246,7 +250,8 @@ class Mechanism:
             coordinates: by name, m and rad; the names tell the set: see `coordinate_sets`.
             rates: by the same names, per second; zero where left out.
             second_rates: likewise.
-            branch: the sign of sin γ in the paper's coordinates, whose γ follows from Eq. 5 up to sign.
+            branch: the sign of sin(γ + γ_0) in the paper's coordinates, where Eq. 5 leaves two γ;
+                γ_0 is zero where the points b_i of the rod's legs lie at the height of o, as in the paper.
             guess: pose or poses (..., 4, 4) near which dependent coordinates are sought; home by default.
             continued: start each state's dependent coordinates from the state before, as along a motion.
 
@@ -264,7 +269,7 @@ class Mechanism:
         'NO_BRANCH'
         """
         if branch not in (-1, +1):
-            raise CoordinateError(f"branch is {branch!r}; must be +1 or -1, the sign of sin γ")
+            raise CoordinateError(f"branch is {branch!r}; must be +1 or -1")
         set = self._set_of(coordinates)
         names, _ = self._sets[set]
         series: list[Mapping[str, ArrayLike]] = [coordinates, rates or {}, second_rates or {}]

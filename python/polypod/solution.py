@@ -59,7 +59,7 @@ VARIABLES: dict[str, tuple[tuple[str, ...], str, str, str]] = {
     "rod_eps": (_ROD3, "rad/s^2", "ε_L", "angular acceleration of the rod"),
     "wrench": (_SIX, "N and N m", "(F_o, T_o)", "load on the platform at o, in its own axes"),
     "force": (_LEG, "N", "f_a", "active force of the leg"),
-    "constraint": (("time", "constraint_row"), "N, N m or N/m", "f_c", "multiplier of the constraint"),
+    "constraint": (("time", "constraint_row"), "N or N m", "f_c", "multiplier of the constraint"),
     "coupled_force": (("time", "coupled_leg"), "N", "f_c1, f_c3", "couple-constrained force"),
     "coupled_torque": (_TIME, "N m", "T_c", "couple-constrained torque on the rod"),
     "coupled_force_as_printed": (("time", "coupled_leg"), "N", "f_c1, f_c3", "the same, Eq. 44 as printed"),
@@ -127,6 +127,7 @@ def solve(mech: Mechanism, motion: Motion, *, progress: Callable[[int, int], Non
 def _solve_chunk(mech: Mechanism, motion: Motion, state: State, chunk: slice) -> dict[str, NDArray[Any]]:
     """All variables of some states."""
     pose, twist, acceleration = state.pose[chunk], state.twist[chunk], state.acceleration[chunk]
+    legs = mech.inverse_kinematics(pose)
     kin = mech.kinematics(pose, twist, acceleration)
     wrench = None if motion.wrench is None else motion.wrench[chunk]
     own = mech.geometry["load"]
@@ -142,10 +143,10 @@ def _solve_chunk(mech: Mechanism, motion: Motion, state: State, chunk: slice) ->
         "pose": pose,
         "twist": twist,
         "acceleration": acceleration,
-        "length": kin.lengths,
+        "length": legs.lengths,
         "rate": kin.rates,
         "leg_acceleration": kin.accelerations,
-        "direction": kin.directions,
+        "direction": legs.directions,
         "leg_omega": kin.leg_omega,
         "leg_eps": kin.leg_eps,
         "leg_spin": kin.leg_spin,

@@ -23,6 +23,12 @@ class Status(IntEnum):
     OFF_CONSTRAINT = 6
     INVALID_INPUT = 7
     BRANCH_JUMP = 8
+    OUT_OF_CONE = 9
+
+    @property
+    def has_answer(self) -> bool:
+        """Whether the numbers of such a state stand."""
+        return self in (Status.OK, Status.OUT_OF_STROKE, Status.OUT_OF_CONE)
 
     @property
     def message(self) -> str:

@@ -159,7 +159,7 @@ def summarise(mech: Mechanism, solution: Solution) -> dict[str, Any]:
         "coordinate_set": data.attrs["coordinate_set"],
         "units": "SI, rad",
         "states": len(time),
-        "without_answer": int(np.sum(~np.isin(of("status"), (Status.OK, Status.OUT_OF_STROKE)))),
+        "without_answer": int(np.sum(~np.isin(of("status"), [s for s in Status if s.has_answer]))),
         "start": float(time[0]),
         "end": float(time[-1]),
         "platform": {

@@ -112,7 +112,7 @@ fn check_freedoms(mech: &Mechanism) -> Option<Fault> {
         Ordering::Greater => {
             let surplus = actuators - dof;
             let message = format!(
-                "{given}; redundant actuation is not there yet: set `actuated = false` on {surplus} of them"
+                "{given}; redundant actuation is not supported: set `actuated = false` on {surplus} of them"
             );
             Some(Fault::new("legs", message))
         }

@@ -4,7 +4,7 @@ use crate::constraint;
 use crate::coordinates::{self, MAX_COORDINATES, Set, State, Values};
 use crate::dynamics;
 use crate::jacobian;
-use crate::joints::{self, Zero};
+use crate::joints::{self, Zero, cone_angle};
 use crate::leg;
 use crate::mechanism::Mechanism;
 use crate::mobility;
@@ -91,7 +91,11 @@ const ROTATION_TOLERANCE: f64 = 1e-6;
 pub const CONSTRAINT_TOLERANCE: f64 = 1e-6;
 
 /// Pivot ratio of the scaled Jacobian below which it is singular to working precision.
-const SINGULAR_PIVOTS: f64 = 1e-13;
+const SINGULAR_PIVOTS: f64 = 1e-12;
+
+/// Sine of the angle between a leg and the axis of its universal joint, and length of a leg relative to the
+/// characteristic length, below which the leg has no frame.
+const LEG_TOLERANCE: f64 = 1e-6;
 
 fn six(values: &[f64], i: usize) -> [f64; 6] {
     std::array::from_fn(|k| values[6 * i + k])
@@ -105,13 +109,30 @@ fn raw_pose(poses: &[f64], i: usize) -> Pose<f64> {
     }
 }
 
+/// Whether sixteen numbers are a homogeneous matrix.
+fn is_rotation(poses: &[f64], i: usize) -> bool {
+    let m = &poses[16 * i..16 * i + 16];
+    m.iter().all(|x| x.is_finite())
+        && m[12..] == [0.0, 0.0, 0.0, 1.0]
+        && raw_pose(poses, i).rotation.rotation_error() <= ROTATION_TOLERANCE
+}
+
 fn read_pose(mech: &Mechanism, poses: &[f64], i: usize) -> (Pose<f64>, Status) {
     let pose = raw_pose(poses, i);
-    let m = &poses[16 * i..16 * i + 16];
-    let valid = m.iter().all(|x| x.is_finite())
-        && m[12..] == [0.0, 0.0, 0.0, 1.0]
-        && pose.rotation.rotation_error() <= ROTATION_TOLERANCE;
-    (pose, if valid { check_pose(mech, &pose) } else { Status::InvalidInput })
+    let valid = is_rotation(poses, i);
+    let status = if valid { Status::Ok } else { Status::InvalidInput };
+    let status = then(status, || check_legs(mech, &pose));
+    (pose, then(status, || check_pose(mech, &pose)))
+}
+
+/// Whether every leg has a direction and a frame: no length of zero, no axis of a universal joint (or rod) along it.
+fn check_legs(mech: &Mechanism, pose: &Pose<f64>) -> Status {
+    let regular = mech.legs.iter().all(|leg| {
+        let p = leg::position(leg, pose);
+        let sine = leg::frame(leg, pose, &p).sine;
+        p.length > LEG_TOLERANCE * mech.characteristic_length && sine > LEG_TOLERANCE
+    });
+    if regular { Status::Ok } else { Status::Singular }
 }
 
 /// Whether a pose satisfies the constraints.
@@ -172,12 +193,20 @@ fn check_finite(values: &[f64]) -> Status {
     if values.iter().all(|x| x.is_finite()) { Status::Ok } else { Status::InvalidInput }
 }
 
-fn stroke_status(mech: &Mechanism, pose: &Pose<f64>) -> Status {
-    let inside = mech.legs.iter().all(|leg| {
-        let length = leg::position(leg, pose).length;
-        leg.stroke[0] <= length && length <= leg.stroke[1]
-    });
-    if inside { Status::Ok } else { Status::OutOfStroke }
+/// The limit that a pose breaks, strokes before cones.
+fn limit_status(mech: &Mechanism, pose: &Pose<f64>) -> Status {
+    let mut status = Status::Ok;
+    for leg in &mech.legs {
+        let p = leg::position(leg, pose);
+        if !(leg.stroke[0] <= p.length && p.length <= leg.stroke[1]) {
+            return Status::OutOfStroke;
+        }
+        let seen = [(&leg.base, p.delta), (&leg.platform, pose.rotation.transpose_mul(p.delta))];
+        if seen.iter().any(|(joint, delta)| joint.cone_limit.is_some_and(|a| cone_angle(joint, *delta) > a)) {
+            status = Status::OutOfCone;
+        }
+    }
+    status
 }
 
 /// Lengths, vectors r and directions δ of all legs [Eq. 3].
@@ -191,7 +220,7 @@ pub fn inverse_kinematics(mech: &Mechanism, poses: &[f64]) -> Table {
     for i in 0..states {
         let (pose, mut status) = read_pose(mech, poses, i);
         if status == Status::Ok {
-            status = stroke_status(mech, &pose);
+            status = limit_status(mech, &pose);
             for (k, leg) in mech.legs.iter().enumerate() {
                 let p = leg::position(leg, &pose);
                 table.set(lengths, i, k, &[p.length]);
@@ -210,6 +239,9 @@ pub fn jacobians(mech: &Mechanism, poses: &[f64]) -> Table {
     let states = poses.len() / 16;
     let (mut table, [matrix]) = Table::new(states, [("jacobian", vec![6, 6])]);
     for i in 0..states {
+        if !is_rotation(poses, i) {
+            continue;
+        }
         for (k, row) in jacobian::jacobian(mech, &raw_pose(poses, i)).iter().enumerate() {
             table.set(matrix, i, k, row);
         }
@@ -223,6 +255,9 @@ pub fn hessians(mech: &Mechanism, poses: &[f64]) -> Table {
     let states = poses.len() / 16;
     let (mut table, [layers]) = Table::new(states, [("hessian", vec![6, 6, 6])]);
     for i in 0..states {
+        if !is_rotation(poses, i) {
+            continue;
+        }
         for (k, row) in jacobian::hessian(mech, &raw_pose(poses, i)).as_flattened().iter().enumerate() {
             table.set(layers, i, k, row);
         }
@@ -264,7 +299,7 @@ pub fn kinematics(mech: &Mechanism, states: &States) -> Table {
     let zeros: Vec<Zero> = mech.legs.iter().map(|leg| Zero::of(leg, &mech.home)).collect();
     for i in 0..n {
         let (platform, status) = states.read(mech, i);
-        table.status[i] = then(status, || stroke_status(mech, &platform.pose));
+        table.status[i] = then(status, || limit_status(mech, &platform.pose));
         if status != Status::Ok {
             continue;
         }
@@ -337,9 +372,9 @@ pub fn inverse_dynamics(mech: &Mechanism, states: &States, loads: &Loads) -> Tab
         let mut status = then(status, || check_finite(&load.array()));
         if status == Status::Ok {
             let (f, pivots) = dynamics::inverse_dynamics(mech, &platform, load);
-            status = outcome(&f, pivots);
+            status = outcome(mech, &f, pivots);
             if status == Status::Ok {
-                status = stroke_status(mech, &platform.pose);
+                status = limit_status(mech, &platform.pose);
                 put_forces(mech, &mut table, forces, i, &f);
                 table.set(multipliers, i, 0, &f[mech.dof()..]);
             }
@@ -349,8 +384,9 @@ pub fn inverse_dynamics(mech: &Mechanism, states: &States, loads: &Loads) -> Tab
     table
 }
 
-fn outcome(solution: &[f64; 6], pivots: f64) -> Status {
-    if pivots > SINGULAR_PIVOTS && solution.iter().all(|x| x.is_finite()) {
+fn outcome(mech: &Mechanism, solution: &[f64; 6], pivots: f64) -> Status {
+    let controlled = mech.mobility.uncontrolled == 0;
+    if controlled && pivots > SINGULAR_PIVOTS && solution.iter().all(|x| x.is_finite()) {
         Status::Ok
     } else {
         Status::Singular
@@ -377,7 +413,7 @@ pub fn platform_twist(mech: &Mechanism, poses: &[f64], rates: &[f64]) -> Table {
         let mut status = then(status, || check_finite(&legs));
         if status == Status::Ok {
             let (twist, pivots) = jacobian::platform_twist(mech, &pose, &legs);
-            status = outcome(&twist.array(), pivots);
+            status = outcome(mech, &twist.array(), pivots);
             if status == Status::Ok {
                 table.set(field, i, 0, &twist.array());
             }
@@ -405,7 +441,7 @@ pub fn platform_acceleration(
         let mut status = then(status, || check_finite(&legs));
         if status == Status::Ok {
             let (a, pivots) = jacobian::platform_acceleration(mech, &pose, &twist, &legs);
-            status = outcome(&a.array(), pivots);
+            status = outcome(mech, &a.array(), pivots);
             if status == Status::Ok {
                 table.set(field, i, 0, &a.array());
             }
@@ -479,7 +515,7 @@ pub fn power(mech: &Mechanism, states: &States, loads: &Loads) -> Table {
             + mech.angular_damping * twist.omega.dot(twist.omega));
         let (f, pivots) = dynamics::inverse_dynamics(mech, &platform, wrench);
         let rates = mech.actuated().map(|(_, leg)| leg::row(&leg::position(leg, pose)).power(twist));
-        table.status[i] = then(outcome(&f, pivots), || stroke_status(mech, pose));
+        table.status[i] = then(outcome(mech, &f, pivots), || limit_status(mech, pose));
         let singular = table.status[i] == Status::Singular;
         let actuators = if singular { f64::NAN } else { rates.zip(&f).map(|(rate, f)| rate * f).sum() };
         // What the efficiency takes: actuators serve the platform's term of [Eq. 42] 1/η times.
@@ -563,7 +599,12 @@ pub fn states(mech: &Mechanism, input: &Coordinates, n: usize) -> Table {
         });
         let guess = match input.guess {
             Some(poses) if i == 0 || !input.continued => {
-                raw_pose(poses, if poses.len() == 16 { 0 } else { i })
+                let k = if poses.len() == 16 { 0 } else { i };
+                if !is_rotation(poses, k) {
+                    table.status[i] = Status::InvalidInput;
+                    continue;
+                }
+                raw_pose(poses, k)
             }
             None if !input.continued => mech.home,
             _ => last,
@@ -600,9 +641,11 @@ pub fn states(mech: &Mechanism, input: &Coordinates, n: usize) -> Table {
     table
 }
 
-/// A state whose coordinates were all given breaks the constraints unless they happen to fit.
+/// A state is none where a leg has no frame, or where coordinates that were all given break the constraints.
 fn checked(mech: &Mechanism, mut state: State, all_given: bool) -> State {
     let Motion { pose, twist, acceleration } = &state.platform;
+    // A root that a constraint has only because a leg has no frame there is none.
+    state.status = then(state.status, || check_legs(mech, pose));
     if all_given && state.status == Status::Ok {
         state.status = then(check_pose(mech, pose), || check_twist(mech, pose, twist));
         state.status = then(state.status, || check_acceleration(mech, pose, twist, acceleration));

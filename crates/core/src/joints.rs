@@ -56,11 +56,8 @@ fn one(
 ) -> JointAngles {
     let (n, delta) = (body.transpose_mul(state.frame.n()), body.transpose_mul(state.position.delta));
     let omega = body.transpose_mul(omega);
-    let mut result = JointAngles {
-        angles: [f64::NAN; 2],
-        rates: [f64::NAN; 2],
-        cone: joint.cone_axis.cross(delta).norm().atan2(joint.cone_axis.dot(delta)),
-    };
+    let mut result =
+        JointAngles { angles: [f64::NAN; 2], rates: [f64::NAN; 2], cone: cone_angle(joint, delta) };
     match (joint.kind, joint.axis) {
         (JointKind::Universal, Some(u)) => {
             let swing = |delta: Vec3<f64>, n: Vec3<f64>| delta.dot(n.cross(u)).atan2(delta.dot(u));
@@ -74,6 +71,12 @@ fn one(
         _ => {}
     }
     result
+}
+
+/// The angle between the joint's cone axis and the leg's direction, both in the axes of the body.
+#[must_use]
+pub fn cone_angle(joint: &Joint, delta: Vec3<f64>) -> f64 {
+    joint.cone_axis.cross(delta).norm().atan2(joint.cone_axis.dot(delta))
 }
 
 /// The turn about `axis` that takes `from` to `to`.

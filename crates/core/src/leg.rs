@@ -114,7 +114,13 @@ impl<T: Real> Frame<T> {
 pub fn frame<T: Real>(leg: &Leg, pose: &Pose<T>, p: &Position<T>) -> Frame<T> {
     let (u, _) = turning_axis(leg.turning, pose);
     let normal = match leg.turning {
-        Turning::Across(..) | Turning::Free(_) => u.cross(p.delta),
+        Turning::Across(..) => u.cross(p.delta),
+        // Any direction will do; the second is for a leg that comes near the first.
+        Turning::Free(first) => {
+            let (a, b) = (u.cross(p.delta), Vec3::lift(first.perpendicular()).cross(p.delta));
+            let clear = a.dot(a).value() > 0.25;
+            Vec3::new(T::select(clear, a.x, b.x), T::select(clear, a.y, b.y), T::select(clear, a.z, b.z))
+        }
         Turning::Along(..) => u,
     };
     let sine = normal.norm();

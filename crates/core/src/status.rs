@@ -12,7 +12,7 @@ pub enum Status {
     Fold = 2,
     /// The iteration for the dependent coordinates did not converge.
     NotConverged = 3,
-    /// The Jacobian is singular to working precision.
+    /// The Jacobian is singular to working precision, or a leg has no frame.
     Singular = 4,
     /// A leg is longer or shorter than its stroke allows; the numbers stand.
     OutOfStroke = 5,
@@ -22,10 +22,12 @@ pub enum Status {
     InvalidInput = 7,
     /// The dependent coordinates came out on another branch than those of the state before.
     BranchJump = 8,
+    /// A leg leans further from a joint's cone axis than the cone allows; the numbers stand.
+    OutOfCone = 9,
 }
 
 impl Status {
-    pub const ALL: [Status; 9] = [
+    pub const ALL: [Status; 10] = [
         Status::Ok,
         Status::NoBranch,
         Status::Fold,
@@ -35,6 +37,7 @@ impl Status {
         Status::OffConstraint,
         Status::InvalidInput,
         Status::BranchJump,
+        Status::OutOfCone,
     ];
 
     /// What it means and what helps.
@@ -54,7 +57,8 @@ impl Status {
                 "no pose was found from the guess; give a guess nearer to the pose or check that it exists"
             }
             Status::Singular => {
-                "the Jacobian is singular to working precision: forces or velocities are not determined at this pose"
+                "singular to working precision: a leg has no length or lies along the axis of its joint, or the \
+                 Jacobian does not determine forces and velocities at this pose"
             }
             Status::OutOfStroke => {
                 "a leg is outside its stroke; the numbers stand, the machine cannot reach the pose"
@@ -66,6 +70,9 @@ impl Status {
             Status::BranchJump => {
                 "between the state before and this one the dependent coordinates passed a fold and came out on \
                  another branch; take smaller steps, or coordinates without this fold"
+            }
+            Status::OutOfCone => {
+                "a joint turns beyond its cone limit; the numbers stand, the machine cannot reach the pose"
             }
             Status::InvalidInput => {
                 "the input holds NaN or infinity, or its rotation is not a rotation matrix"
