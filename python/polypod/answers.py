@@ -121,12 +121,19 @@ class Power(NamedTuple):
     """Energies and powers of a motion [T17]; W and J."""
 
     kinetic: Array
+    """(...): kinetic energy of all links, J."""
     potential: Array
+    """(...): potential energy of their weights, J; zero in the base's origin."""
     kinetic_rate: Array
+    """(...): exact rate along the motion, W."""
     potential_rate: Array
+    """(...): W."""
     actuators: Array
+    """(...): active forces times leg rates, W, positive where they drive; NaN where SINGULAR."""
     load: Array
+    """(...): W, positive where the load drives."""
     damping: Array
+    """(...): W, never positive."""
     friction: Array
     """Power that the efficiency η stands for, negative where it takes."""
     residual: Array
@@ -138,8 +145,11 @@ class Conditioning(NamedTuple):
     """Singular values of the leg Jacobian on the twists that the constraints allow [T24]; pure numbers."""
 
     sigma_min: Array
+    """(...): the smallest: near zero the platform moves with hardly any change of the leg lengths."""
     sigma_max: Array
+    """(...): the largest."""
     condition: Array
+    """(...): their quotient, sigma_max / sigma_min."""
     status: Codes
 
 
