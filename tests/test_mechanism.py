@@ -531,3 +531,22 @@ def test_mobility_of_a_tricept() -> None:
     assert {leg for leg, _ in m.constraint_rows} == {"centre"}
     assert len(m.independent_rows) == 3
     assert eq1(m, 0, 0) == 3
+
+
+@pytest.mark.parametrize(("degrees", "sound"), [(1e-5, True), (1e-3, False)])
+def test_home_may_miss_the_constraints_by_rounding_only(degrees: float, sound: bool) -> None:
+    tables = changed(PAPER, home__rotation_vector=[0.0, 0.0, degrees])
+    if sound:
+        assert pp.Mechanism.from_dict(tables).dof == 5
+    else:
+        assert {place for place, _ in faults_of(tables)} == {"home"}
+
+
+@pytest.mark.parametrize(("millimetres", "sound"), [(1e-5, True), (1e-2, False)])
+def test_a_rod_may_miss_its_joints_by_rounding_only(millimetres: float, sound: bool) -> None:
+    tables = changed(PAPER, rods__1__point=[0.0, 270.0 * math.sin(math.radians(18.0)) + millimetres, 0.0])
+    if sound:
+        assert pp.Mechanism.from_dict(tables).dof == 5
+    else:
+        places = {place for place, _ in faults_of(tables)}
+        assert places == {"legs.1.base.point", "legs.3.base.point"}

@@ -6,7 +6,7 @@ use crate::mechanism::{Constraint, ConstraintKind, Joint, Leg, Mechanism, Partne
 use crate::quadratic::{Hessian, add_centripetal, add_mixed, point_columns};
 use crate::real::Real;
 use crate::spatial::{Mat3, Pose, Vec3, Wrench};
-use crate::spec::JointKind;
+use crate::spec::{ANGLE_TOLERANCE, JointKind};
 
 const NO_PARTNER: Partner = Partner {
     base_point: Vec3 { x: 0.0, y: 0.0, z: 0.0 },
@@ -77,6 +77,8 @@ pub fn of_rod(mech_legs: &[Leg], rod: usize, axis: Vec3<f64>, home: &Pose<f64>) 
     let make = |&i: &usize| {
         let second = across(i);
         let angle = first.cross(second).dot(axis).atan2(first.dot(second));
+        // Parallel up to the rounding of a file's numbers is parallel.
+        let angle = if angle.abs() <= ANGLE_TOLERANCE { 0.0 } else { angle };
         Constraint {
             kind: ConstraintKind::E,
             leg: i,
