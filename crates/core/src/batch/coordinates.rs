@@ -1,0 +1,119 @@
+//! Coordinates of many states.
+
+use super::Table;
+use super::checks::{
+    check_acceleration, check_legs, check_pose, check_twist, is_rotation, raw_pose, read_pose, then,
+};
+use crate::coordinates::{self, MAX_COORDINATES, Set, State, Values};
+use crate::mechanism::Mechanism;
+use crate::real::Jet;
+use crate::spatial::Motion;
+use crate::status::Status;
+
+/// Given coordinates of the states with their rates and second rates: `given[k]` holds the three series of the
+/// `k`-th number of the set, or nothing where it is to be solved.
+#[derive(Clone, Debug)]
+pub struct Coordinates<'a> {
+    pub set: Set,
+    pub given: Vec<Option<[&'a [f64]; 3]>>,
+    pub branch: f64,
+    /// Poses to start the dependent coordinates from, one for each state or one for all; home without any.
+    pub guess: Option<&'a [f64]>,
+    /// Start each state from the pose of the last one that was solved.
+    pub continued: bool,
+}
+
+/// Pose, twist, acceleration and all coordinates of the set [Eq. 2, 5] \[T19\]-\[T23\].
+#[must_use]
+pub fn states(mech: &Mechanism, input: &Coordinates, n: usize) -> Table {
+    let names = input.set.names();
+    let (mut table, [poses, twists, accelerations, values, rates, second_rates]) = Table::new(
+        n,
+        [
+            ("pose", vec![4, 4]),
+            ("twist", vec![6]),
+            ("acceleration", vec![6]),
+            ("coordinates", vec![names.len()]),
+            ("coordinate_rates", vec![names.len()]),
+            ("coordinate_second_rates", vec![names.len()]),
+        ],
+    );
+    let mask: Vec<bool> =
+        (0..MAX_COORDINATES).map(|k| k >= names.len() || input.given[k].is_some()).collect();
+    let all_given = mask.iter().all(|&given| given) && !mech.independent.is_empty();
+    let (mut last, mut branch) = (mech.home, f64::NAN);
+    for i in 0..n {
+        let q: Values<Jet<f64>> = std::array::from_fn(|k| match input.given.get(k).copied().flatten() {
+            Some([x, d, dd]) => Jet::new(x[i], d[i], dd[i]),
+            None => Jet::new(0.0, 0.0, 0.0),
+        });
+        let guess = match input.guess {
+            Some(poses) if i == 0 || !input.continued => {
+                let k = if poses.len() == 16 { 0 } else { i };
+                if !is_rotation(poses, k) {
+                    table.status[i] = Status::InvalidInput;
+                    continue;
+                }
+                raw_pose(poses, k)
+            }
+            None if !input.continued => mech.home,
+            _ => last,
+        };
+        let state = coordinates::state(mech, &input.set, &q, &mask, input.branch, &guess);
+        let state = checked(mech, state, all_given);
+        let jumped = input.continued && state.status == Status::Ok && state.branch * branch < 0.0;
+        table.status[i] = if jumped { Status::BranchJump } else { state.status };
+        let found = state.platform.pose.rotation.0.iter().all(|c| c.norm().is_finite());
+        let solved = found && matches!(table.status[i], Status::Ok | Status::Fold);
+        if solved {
+            if state.status == Status::Ok {
+                (last, branch) = (state.platform.pose, state.branch);
+            }
+            let (r, o) = (state.platform.pose.rotation.rows(), state.platform.pose.o.array());
+            for k in 0..3 {
+                table.set(poses, i, k, &[r[k][0], r[k][1], r[k][2], o[k]]);
+            }
+            table.set(poses, i, 3, &[0.0, 0.0, 0.0, 1.0]);
+        }
+        if table.status[i] == Status::Ok {
+            table.set(twists, i, 0, &state.platform.twist.array());
+            table.set(accelerations, i, 0, &state.platform.acceleration.array());
+        }
+        for k in 0..names.len() {
+            if solved || mask[k] {
+                let jet = state.coordinates[k];
+                table.set(values, i, k, &[jet.x]);
+                table.set(rates, i, k, &[jet.d]);
+                table.set(second_rates, i, k, &[jet.dd]);
+            }
+        }
+    }
+    table
+}
+
+/// A state is none where a leg has no frame, or where coordinates that were all given break the constraints.
+fn checked(mech: &Mechanism, mut state: State, all_given: bool) -> State {
+    let Motion { pose, twist, acceleration } = &state.platform;
+    // A root that a constraint has only because a leg has no frame there is none.
+    state.status = then(state.status, || check_legs(mech, pose));
+    if all_given && state.status == Status::Ok {
+        state.status = then(check_pose(mech, pose), || check_twist(mech, pose, twist));
+        state.status = then(state.status, || check_acceleration(mech, pose, twist, acceleration));
+    }
+    state
+}
+
+/// The numbers of a set at each pose: the inverse of [`states`].
+#[must_use]
+pub fn coordinate_values(mech: &Mechanism, set: &Set, poses: &[f64]) -> Table {
+    let n = poses.len() / 16;
+    let (mut table, [values]) = Table::new(n, [("coordinates", vec![set.names().len()])]);
+    for i in 0..n {
+        let (pose, status) = read_pose(mech, poses, i);
+        table.status[i] = status;
+        if status == Status::Ok {
+            table.set(values, i, 0, &set.values(mech, &pose)[..set.names().len()]);
+        }
+    }
+    table
+}

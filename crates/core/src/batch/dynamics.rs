@@ -1,0 +1,150 @@
+//! Dynamics of many states.
+
+use super::checks::{check_finite, limit_status, outcome, read_pose, six, then};
+use super::{FieldId, States, Table};
+use crate::dynamics;
+use crate::leg;
+use crate::mechanism::Mechanism;
+use crate::mobility;
+use crate::real::Dual;
+use crate::spatial::{Mat3, Motion, Pose, Twist, Vec3, Wrench};
+use crate::spec::Axes;
+use crate::status::Status;
+
+/// The loads of the states: the mechanism's own, or six numbers for each.
+#[derive(Clone, Copy, Debug)]
+pub enum Loads<'a> {
+    Own,
+    Given(&'a [f64], Axes),
+}
+
+impl Loads<'_> {
+    fn at(&self, mech: &Mechanism, pose: &Pose<f64>, i: usize) -> Wrench<f64> {
+        match self {
+            Loads::Own => dynamics::load_in_base(mech.load.wrench, mech.load.axes, pose),
+            Loads::Given(values, axes) => {
+                dynamics::load_in_base(Wrench::from_array(six(values, i)), *axes, pose)
+            }
+        }
+    }
+}
+
+/// Active forces of all legs (zero for passive ones) and multipliers of the independent constraints [Eq. 43].
+#[must_use]
+pub fn inverse_dynamics(mech: &Mechanism, states: &States, loads: &Loads) -> Table {
+    let n = states.len();
+    let (mut table, [forces, multipliers]) =
+        Table::new(n, [("forces", vec![mech.legs.len()]), ("constraint", vec![mech.independent.len()])]);
+    for i in 0..n {
+        let (platform, status) = states.read(mech, i);
+        let load = loads.at(mech, &platform.pose, i);
+        let mut status = then(status, || check_finite(&load.array()));
+        if status == Status::Ok {
+            let (f, pivots) = dynamics::inverse_dynamics(mech, &platform, load);
+            status = outcome(mech, &f, pivots);
+            if status == Status::Ok {
+                status = limit_status(mech, &platform.pose);
+                put_forces(mech, &mut table, forces, i, &f);
+                table.set(multipliers, i, 0, &f[mech.dof()..]);
+            }
+        }
+        table.status[i] = status;
+    }
+    table
+}
+
+fn put_forces(mech: &Mechanism, table: &mut Table, field: FieldId, state: usize, forces: &[f64; 6]) {
+    for k in 0..mech.legs.len() {
+        table.set(field, state, k, &[0.0]);
+    }
+    for ((k, _), f) in mech.actuated().zip(forces) {
+        table.set(field, state, k, &[*f]);
+    }
+}
+
+/// Forces on the platform at the ends of two coupled legs, and the torque on their rod, from the multiplier \[T16\].
+/// None for a mechanism without such a pair.
+#[must_use]
+pub fn coupled_forces(
+    mech: &Mechanism,
+    poses: &[f64],
+    multipliers: &[f64],
+    as_printed: bool,
+) -> Option<([usize; 2], Table)> {
+    let (pair, axis, platform_axis) = mobility::coupled_pair(mech)?;
+    let index = mech.independent.iter().position(|c| pair.contains(&c.leg))?;
+    let (n, k) = (poses.len() / 16, mech.independent.len());
+    let (mut table, [forces, torque]) = Table::new(n, [("forces", vec![2]), ("torque", vec![])]);
+    for i in 0..n {
+        let (pose, status) = read_pose(mech, poses, i);
+        let f_c = multipliers[i * k + index];
+        table.status[i] = then(status, || check_finite(&[f_c]));
+        if table.status[i] == Status::Ok {
+            let c = dynamics::coupled_forces(mech, pair, axis, platform_axis, &pose, f_c, as_printed);
+            if c.forces.iter().all(|f| f.is_finite()) {
+                table.set(forces, i, 0, &c.forces);
+                table.set(torque, i, 0, &[c.torque]);
+            } else {
+                table.status[i] = Status::Singular;
+            }
+        }
+    }
+    Some((pair, table))
+}
+
+/// Energies with their exact rates along the motion, and every power of the balance \[T17\].
+#[must_use]
+pub fn power(mech: &Mechanism, states: &States, loads: &Loads) -> Table {
+    let n = states.len();
+    let names = [
+        "kinetic",
+        "potential",
+        "kinetic_rate",
+        "potential_rate",
+        "actuators",
+        "load",
+        "damping",
+        "friction",
+        "residual",
+    ];
+    let (mut table, ids) = Table::new(n, names.map(|name| (name, vec![])));
+    for i in 0..n {
+        let (platform, status) = states.read(mech, i);
+        let Motion { pose, twist, .. } = &platform;
+        let wrench = loads.at(mech, pose, i);
+        table.status[i] = then(status, || check_finite(&wrench.array()));
+        if table.status[i] != Status::Ok {
+            continue;
+        }
+        let (kinetic, potential) = energy_along(mech, &platform);
+        let load = wrench.power(twist);
+        let damping = -(mech.linear_damping * twist.v.dot(twist.v)
+            + mech.angular_damping * twist.omega.dot(twist.omega));
+        let (f, pivots) = dynamics::inverse_dynamics(mech, &platform, wrench);
+        let rates = mech.actuated().map(|(_, leg)| leg::row(&leg::position(leg, pose)).power(twist));
+        table.status[i] = then(outcome(mech, &f, pivots), || limit_status(mech, pose));
+        let singular = table.status[i] == Status::Singular;
+        let actuators = if singular { f64::NAN } else { rates.zip(&f).map(|(rate, f)| rate * f).sum() };
+        // What the efficiency takes: actuators serve the platform's term of [Eq. 42] 1/η times.
+        let own = (wrench + dynamics::platform_wrench(mech, &platform)).power(twist);
+        let friction = (1.0 / mech.efficiency - 1.0) * own;
+        let residual = actuators + load + damping + friction - kinetic.d - potential.d;
+        let values =
+            [kinetic.x, potential.x, kinetic.d, potential.d, actuators, load, damping, friction, residual];
+        for (id, value) in ids.iter().zip(values) {
+            table.set(*id, i, 0, &[value]);
+        }
+    }
+    table
+}
+
+/// Kinetic and potential energy as duals along the motion.
+fn energy_along(mech: &Mechanism, platform: &Motion<f64>) -> (Dual<f64>, Dual<f64>) {
+    let Motion { pose, twist, acceleration } = platform;
+    let dual =
+        |x: Vec3<f64>, d: Vec3<f64>| Vec3::new(Dual::new(x.x, d.x), Dual::new(x.y, d.y), Dual::new(x.z, d.z));
+    let rotation = Mat3(pose.rotation.0.map(|c| dual(c, twist.omega.cross(c))));
+    let moving = Pose { rotation, o: dual(pose.o, twist.v) };
+    let twist = Twist::new(dual(twist.v, acceleration.a), dual(twist.omega, acceleration.eps));
+    dynamics::energy(mech, &moving, &twist)
+}

@@ -1,0 +1,86 @@
+//! Many states at once: arrays in, a [`Table`] out, one status per state, NaN where there is no answer.
+
+mod checks;
+mod coordinates;
+mod dynamics;
+mod kinematics;
+
+pub use checks::CONSTRAINT_TOLERANCE;
+pub use coordinates::{Coordinates, coordinate_values, states};
+pub use dynamics::{Loads, coupled_forces, inverse_dynamics, power};
+pub use kinematics::{
+    conditioning, hessians, inverse_kinematics, jacobians, kinematics, platform_acceleration, platform_twist,
+};
+
+use crate::mechanism::Mechanism;
+use crate::spatial::{Acceleration, Motion, Twist};
+use crate::status::Status;
+use checks::{check_acceleration, check_twist, read_pose, six, then};
+
+/// One output array: its row for a state has the given shape.
+#[derive(Clone, Debug)]
+pub struct Field {
+    pub name: &'static str,
+    pub shape: Vec<usize>,
+    pub data: Vec<f64>,
+}
+
+/// Named output arrays over the states, all NaN until set.
+#[derive(Clone, Debug)]
+pub struct Table {
+    pub fields: Vec<Field>,
+    pub status: Vec<Status>,
+}
+
+/// The number of a field in its table.
+#[derive(Clone, Copy, Debug)]
+struct FieldId(usize);
+
+impl Table {
+    fn new<const N: usize>(states: usize, fields: [(&'static str, Vec<usize>); N]) -> (Self, [FieldId; N]) {
+        let fields = fields.map(|(name, shape)| {
+            let width: usize = shape.iter().product();
+            Field { name, shape, data: vec![f64::NAN; states * width] }
+        });
+        let table = Table { fields: fields.into(), status: vec![Status::Ok; states] };
+        (table, std::array::from_fn(FieldId))
+    }
+
+    /// Writes `values` as the `part`-th piece of that size in the state's row.
+    fn set(&mut self, field: FieldId, state: usize, part: usize, values: &[f64]) {
+        let field = &mut self.fields[field.0];
+        let width: usize = field.shape.iter().product();
+        let start = state * width + part * values.len();
+        field.data[start..start + values.len()].copy_from_slice(values);
+    }
+}
+
+/// Poses (16 numbers each, rows of the homogeneous matrix), twists and accelerations (6 each) of the states.
+#[derive(Clone, Copy, Debug)]
+pub struct States<'a> {
+    pub poses: &'a [f64],
+    pub twists: &'a [f64],
+    pub accelerations: &'a [f64],
+}
+
+impl States<'_> {
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.poses.len() / 16
+    }
+
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.poses.is_empty()
+    }
+
+    /// The state, and whether it is one that the mechanism can be in.
+    fn read(&self, mech: &Mechanism, i: usize) -> (Motion<f64>, Status) {
+        let (pose, status) = read_pose(mech, self.poses, i);
+        let twist = Twist::from_array(six(self.twists, i));
+        let acceleration = Acceleration::from_array(six(self.accelerations, i));
+        let status = then(status, || check_twist(mech, &pose, &twist));
+        let status = then(status, || check_acceleration(mech, &pose, &twist, &acceleration));
+        (Motion { pose, twist, acceleration }, status)
+    }
+}
