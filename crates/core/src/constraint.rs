@@ -217,6 +217,12 @@ pub fn hessian<T: Real>(constraint: &Constraint, pose: &Pose<T>) -> Hessian<T> {
     h
 }
 
+/// What makes a constraint's value a pure number.
+#[must_use]
+pub fn unit(c: &Constraint, scale: f64) -> f64 {
+    if c.kind == ConstraintKind::D { 1.0 } else { scale }
+}
+
 /// Size of a row with its torque part divided by the length `scale`.
 #[must_use]
 pub fn row_size(row: &Wrench<f64>, scale: f64) -> f64 {

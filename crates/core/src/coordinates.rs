@@ -383,7 +383,7 @@ fn solve_dependent(
     let residual = |q: &Values<Jet<f64>>| -> System {
         let pose = set.pose(mech, &q.map(|c| c.x));
         std::array::from_fn(|k| {
-            mech.independent.get(k).map_or(0.0, |c| constraint::value(c, &pose) / unit(c, scale))
+            mech.independent.get(k).map_or(0.0, |c| constraint::value(c, &pose) / constraint::unit(c, scale))
         })
     };
     let size =
@@ -429,7 +429,9 @@ fn solve_dependent(
     let rates = |q: &Values<Jet<f64>>, part: fn(Jet<f64>) -> f64| -> Solved<f64, MAX_CONSTRAINTS> {
         let pose = set.pose(mech, q);
         let rhs = std::array::from_fn(|k| {
-            mech.independent.get(k).map_or(0.0, |c| -part(constraint::value(c, &pose)) / unit(c, scale))
+            mech.independent
+                .get(k)
+                .map_or(0.0, |c| -part(constraint::value(c, &pose)) / constraint::unit(c, scale))
         });
         solve(matrix, rhs)
     };
@@ -448,11 +450,6 @@ fn solve_dependent(
         q[i].dd = *dd;
     }
     (Status::Ok, first.sign)
-}
-
-/// What makes a constraint's value a pure number.
-fn unit(c: &Constraint, scale: f64) -> f64 {
-    if c.kind == ConstraintKind::D { 1.0 } else { scale }
 }
 
 /// What one unit of a dependent coordinate's step is measured by: a length or a radian.
@@ -477,7 +474,8 @@ fn gradient(
         seeded[i].d = 1.0;
         let pose = set.pose(mech, &seeded);
         for (row, c) in mech.independent.iter().enumerate() {
-            matrix[row][column] = constraint::value(c, &pose).d / unit(c, mech.characteristic_length);
+            matrix[row][column] =
+                constraint::value(c, &pose).d / constraint::unit(c, mech.characteristic_length);
         }
     }
     matrix

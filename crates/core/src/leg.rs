@@ -17,11 +17,17 @@ pub struct Position<T> {
     pub delta: Vec3<T>,
 }
 
+/// e from o to b and r from B to b.
+#[inline(always)]
+pub fn vectors<T: Real>(leg: &Leg, pose: &Pose<T>) -> (Vec3<T>, Vec3<T>) {
+    let e = pose.rotation * Vec3::lift(leg.platform.point);
+    (e, pose.o + e - Vec3::lift(leg.base.point))
+}
+
 /// [Eq. 2, 3] \[T1\] `e = R m, b = o + e, r = b - B, δ = r/ℓ`.
 #[inline(always)]
 pub fn position<T: Real>(leg: &Leg, pose: &Pose<T>) -> Position<T> {
-    let e = pose.rotation * Vec3::lift(leg.platform.point);
-    let r = pose.o + e - Vec3::lift(leg.base.point);
+    let (e, r) = vectors(leg, pose);
     let length = r.norm();
     Position { e, r, length, delta: r * (T::one() / length) }
 }

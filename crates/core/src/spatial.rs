@@ -216,6 +216,21 @@ impl<T: Real> Mat3<T> {
     }
 }
 
+impl<T: Real> Mat3<T> {
+    /// The Cayley map `(1 - ŵ/2)⁻¹ (1 + ŵ/2)`, a rotation by 2 atan(|w|/2) about w \[T26\].
+    #[must_use]
+    #[inline(always)]
+    pub fn cayley(w: Vec3<T>) -> Self {
+        let half = w * T::lit(0.5);
+        let share = T::lit(2.0) / (T::one() + half.dot(half));
+        Mat3([Vec3::X, Vec3::Y, Vec3::Z].map(|e: Vec3<f64>| {
+            let e = Vec3::lift(e);
+            let across = half.cross(e);
+            e + (across + half.cross(across)) * share
+        }))
+    }
+}
+
 impl Mat3<f64> {
     /// Rodrigues' formula for the turn by |w| about w.
     #[must_use]
@@ -279,6 +294,14 @@ pub struct Pose<T> {
 }
 
 impl<T: Real> Pose<T> {
+    /// The pose after the finite step `(v, w)`: o moves by v and the axes turn by the Cayley map of w, which agrees
+    /// with the rotation by the vector w to second order and needs no trigonometry \[T26\].
+    #[must_use]
+    #[inline(always)]
+    pub fn stepped(&self, step: &Twist<T>) -> Self {
+        Pose { rotation: Mat3::cayley(step.omega) * self.rotation, o: self.o + step.v }
+    }
+
     #[inline(always)]
     pub fn lift(p: &Pose<f64>) -> Self {
         Pose { rotation: Mat3::lift(p.rotation), o: Vec3::lift(p.o) }

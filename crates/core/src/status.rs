@@ -24,10 +24,12 @@ pub enum Status {
     BranchJump = 8,
     /// A leg leans further from a joint's cone axis than the cone allows; the numbers stand.
     OutOfCone = 9,
+    /// The lengths have a pose, but not in the assembly mode of the guess; the pose stands.
+    ModeJump = 10,
 }
 
 impl Status {
-    pub const ALL: [Status; 10] = [
+    pub const ALL: [Status; 11] = [
         Status::Ok,
         Status::NoBranch,
         Status::Fold,
@@ -38,6 +40,7 @@ impl Status {
         Status::InvalidInput,
         Status::BranchJump,
         Status::OutOfCone,
+        Status::ModeJump,
     ];
 
     /// What it means and what helps.
@@ -73,6 +76,10 @@ impl Status {
             }
             Status::OutOfCone => {
                 "a joint turns beyond its cone limit; the numbers stand, the machine cannot reach the pose"
+            }
+            Status::ModeJump => {
+                "on the way from the guess to these lengths its assembly mode ends in a singularity; the pose has the \
+                 lengths but lies in another mode: give a guess in the mode that is meant, or ask for all assembly modes"
             }
             Status::InvalidInput => {
                 "the input holds NaN or infinity, or its rotation is not a rotation matrix"

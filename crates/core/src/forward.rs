@@ -1,0 +1,223 @@
+//! Forward kinematics: from leg lengths to the pose, by Newton's method on SE(3) \[T25\]-\[T27\].
+//!
+//! The equations are polynomials in the pose, for any number: doubles here, complex numbers in
+//! [`modes`](crate::modes), where all of their solutions are followed.
+
+use crate::constraint;
+use crate::leg;
+use crate::linear::solve;
+use crate::mechanism::Mechanism;
+use crate::real::Real;
+use crate::spatial::{Pose, Twist, Vec3, Wrench};
+use crate::status::Status;
+
+/// Steps after which the iteration is given up.
+const NEWTON_STEPS: u32 = 200;
+
+/// Step, relative to the characteristic length, from which the next one is rounding: Newton's method is quadratic.
+const SMALL_STEP: f64 = 1e-9;
+
+/// Residual, as a pure number, that is rounding of zero.
+const ROUNDING: f64 = 2e-14;
+
+/// How much each Newton step must be smaller than the one before. A quarter is what the theorem of Newton and
+/// Kantorovich asks for: the solution is then the only one around, and the one that belongs to the guess.
+const CONTRACTION: f64 = 0.25;
+
+/// Newton steps for one piece of the path: with that contraction no more are needed from half a radian to rounding.
+const PIECE_STEPS: u32 = 12;
+
+/// Shortest piece of the path: where shorter ones would be needed, its assembly mode ends.
+const SHORTEST_PIECE: f64 = 1e-6;
+
+/// The same after an iteration that has converged.
+const MOST_ROUNDING: f64 = 2e-12;
+
+/// Longest Newton step: half a radian, or half a characteristic length.
+const LONGEST_STEP: f64 = 0.5;
+
+/// Share of a Newton step below which there is no way nearer to a solution.
+const SMALLEST_SHARE: f64 = 1e-7;
+
+/// Pivot ratio of the equations below which two assembly modes meet: the pose is then only known to the square root
+/// of rounding.
+pub const FOLD_PIVOTS: f64 = 1e-5;
+
+/// The equations at a pose, pure numbers: `(r·r - ℓ²)/2Λ²` of the actuated legs and g of the independent constraints
+/// \[T25\]. The matrix is their derivative by (v/Λ, ω).
+#[derive(Clone, Copy, Debug)]
+pub struct System<T> {
+    pub residual: [T; 6],
+    pub matrix: [[T; 6]; 6],
+}
+
+#[inline(always)]
+pub fn system<T: Real>(mech: &Mechanism, pose: &Pose<T>, squares: &[T; 6]) -> System<T> {
+    let scale = mech.characteristic_length;
+    let square = T::lit(1.0 / (scale * scale));
+    let half = T::lit(0.5);
+    let mut residual = [T::zero(); 6];
+    let mut matrix = [[T::zero(); 6]; 6];
+    let legs = mech.actuated().zip(squares).map(|((_, leg), &length_square)| {
+        let (e, r) = leg::vectors(leg, pose);
+        ((r.dot(r) - length_square) * half * square, Wrench::at(e, r), square)
+    });
+    let constraints = mech.independent.iter().map(|c| {
+        let unit = T::lit(1.0 / constraint::unit(c, scale));
+        (constraint::value(c, pose) * unit, constraint::row(c, pose), unit)
+    });
+    for (i, (value, Wrench { force, torque }, unit)) in legs.chain(constraints).enumerate() {
+        residual[i] = value;
+        let (a, b) = (force * (unit * T::lit(scale)), torque * unit);
+        matrix[i] = [a.x, a.y, a.z, b.x, b.y, b.z];
+    }
+    System { residual, matrix }
+}
+
+/// A solution (v/Λ, ω) of the system as a step of the pose.
+#[inline(always)]
+pub fn step_of<T: Real>(mech: &Mechanism, x: [T; 6], share: T) -> Twist<T> {
+    let [a, b, c, p, q, r] = x.map(|e| e * share);
+    Twist::new(Vec3::new(a, b, c) * T::lit(mech.characteristic_length), Vec3::new(p, q, r))
+}
+
+/// A Newton step from a pose towards `F = to`, and what it is judged by.
+#[derive(Clone, Copy, Debug)]
+struct Newton {
+    step: [f64; 6],
+    size: f64,
+    residual: f64,
+    pivots: f64,
+    /// Sign of the determinant: it changes where an assembly mode ends.
+    sign: f64,
+}
+
+#[inline(always)]
+fn newton(mech: &Mechanism, pose: &Pose<f64>, squares: &[f64; 6], to: &[f64; 6]) -> Newton {
+    let System { residual, matrix } = system(mech, pose, squares);
+    let residual: [f64; 6] = std::array::from_fn(|i| residual[i] - to[i]);
+    let solved = solve(matrix, residual.map(|f| -f));
+    Newton {
+        step: solved.x,
+        size: size(&solved.x),
+        residual: residual.iter().fold(0.0, |m, f| if f.abs() > m || f.is_nan() { f.abs() } else { m }),
+        pivots: solved.pivots,
+        sign: solved.sign,
+    }
+}
+
+#[inline(always)]
+fn size(x: &[f64; 6]) -> f64 {
+    x.iter().map(|e| e * e).sum::<f64>().sqrt()
+}
+
+/// What an iteration came to.
+#[derive(Clone, Copy, Debug)]
+pub struct Found {
+    pub pose: Pose<f64>,
+    /// The largest error of a length or of a constraint, m.
+    pub residual: f64,
+    pub iterations: u32,
+    /// Sign of det J at the pose.
+    pub sign: f64,
+    pub status: Status,
+}
+
+/// The pose with the given lengths of the actuated legs, in the assembly mode of the guess \[T26\], \[T27\].
+///
+/// Where the mode ends in a singularity on the way, the nearest other solution is sought and reported as one of another
+/// mode.
+#[must_use]
+pub fn forward_kinematics(mech: &Mechanism, lengths: &[f64], guess: &Pose<f64>) -> Found {
+    let squares: [f64; 6] = std::array::from_fn(|i| lengths.get(i).map_or(0.0, |l| l * l));
+    if !lengths.iter().all(|l| *l >= 0.0 && l.is_finite()) {
+        let nan = f64::NAN;
+        return Found { pose: *guess, residual: nan, iterations: 0, sign: nan, status: Status::InvalidInput };
+    }
+    let (continued, steps) = continuation(mech, &squares, guess);
+    if let Some(pose) = continued {
+        let found = polish(mech, &squares, &pose);
+        return Found { iterations: steps + found.iterations, ..found };
+    }
+    let other = polish(mech, &squares, guess);
+    let status = if other.status == Status::Ok { Status::ModeJump } else { other.status };
+    Found { iterations: steps + other.iterations, status, ..other }
+}
+
+/// Follows the solutions of `F = (1 - t) F(guess)` from the guess at t = 0 to t = 1 by Newton's method, in one piece if
+/// it contracts, else in as many as it takes \[T27\]. None where the determinant would change its sign: a singularity
+/// lies on the path. Tells the number of Newton steps.
+fn continuation(mech: &Mechanism, squares: &[f64; 6], guess: &Pose<f64>) -> (Option<Pose<f64>>, u32) {
+    let errors = system(mech, guess, squares).residual;
+    let sign = newton(mech, guess, squares, &[0.0; 6]).sign;
+    let (mut pose, mut t, mut piece, mut steps) = (*guess, 0.0, 1.0_f64, 0);
+    while t < 1.0 {
+        piece = piece.min(1.0 - t);
+        let rest = errors.map(|e| (1.0 - t - piece) * e);
+        let (mut trial, mut last, mut arrived) = (pose, f64::INFINITY, false);
+        for _ in 0..PIECE_STEPS {
+            let at = newton(mech, &trial, squares, &rest);
+            steps += 1;
+            if at.sign != sign || !(at.size <= LONGEST_STEP && at.size <= CONTRACTION * last) {
+                // Steps of the size of rounding contract no more.
+                arrived = at.size <= SMALL_STEP && at.sign == sign;
+                break;
+            }
+            trial = trial.stepped(&step_of(mech, at.step, 1.0));
+            last = at.size;
+            if at.size <= SMALL_STEP {
+                arrived = true;
+                break;
+            }
+        }
+        if arrived {
+            (pose, t, piece) = (trial, t + piece, 2.0 * piece);
+        } else {
+            piece *= 0.5;
+            if piece < SHORTEST_PIECE {
+                return (None, steps);
+            }
+        }
+    }
+    (Some(pose), steps)
+}
+
+/// A solution near a pose, whatever its mode, by Newton steps that are shortened until they come nearer \[T26\].
+#[must_use]
+pub fn polish(mech: &Mechanism, squares: &[f64; 6], guess: &Pose<f64>) -> Found {
+    let mut pose = *guess;
+    let mut at = newton(mech, &pose, squares, &[0.0; 6]);
+    let (mut share, mut iterations) = (1.0_f64, 0);
+    while !(at.residual <= ROUNDING) && iterations < NEWTON_STEPS {
+        share = share.min(LONGEST_STEP / at.size);
+        let trial_pose = pose.stepped(&step_of(mech, at.step, share));
+        let trial = newton(mech, &trial_pose, squares, &[0.0; 6]);
+        iterations += 1;
+        // The last step of a quadratic iteration ends in rounding, whatever it does to the residual.
+        let last = at.size <= SMALL_STEP && trial.residual <= MOST_ROUNDING;
+        if last || trial.residual <= (1.0 - 0.1 * share) * at.residual {
+            (pose, at, share) = (trial_pose, trial, (2.0 * share).min(1.0));
+        } else {
+            share *= 0.25;
+        }
+        if last || !(share > SMALLEST_SHARE) {
+            break;
+        }
+    }
+    let status = if !(at.residual <= MOST_ROUNDING) {
+        Status::NotConverged
+    } else if at.pivots > FOLD_PIVOTS {
+        Status::Ok
+    } else {
+        Status::Singular
+    };
+    Found { pose, residual: error(mech, squares, &pose), iterations, sign: at.sign, status }
+}
+
+/// The largest error of a length or of a constraint, m.
+#[must_use]
+pub fn error(mech: &Mechanism, squares: &[f64; 6], pose: &Pose<f64>) -> f64 {
+    let legs = mech.actuated().zip(squares);
+    let errors = legs.map(|((_, leg), square)| (leg::position(leg, pose).length - square.sqrt()).abs());
+    errors.fold(constraint::largest_distance(mech, pose), |m, e| if e > m || e.is_nan() { e } else { m })
+}

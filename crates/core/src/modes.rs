@@ -1,0 +1,504 @@
+//! All assembly modes: every real pose with given leg lengths \[T28\], \[T29\].
+//!
+//! The equations of [`forward`](crate::forward) are polynomials, so that over the complex numbers they have the same
+//! number of solutions for almost all lengths. All of them are found once for generic complex lengths; from there they
+//! are followed along a path of lengths to the ones that are asked for, and the real ones kept.
+
+use nalgebra::Complex;
+
+use crate::forward::{self, Found, System, step_of, system};
+use crate::leg;
+use crate::linear::solve;
+use crate::mechanism::Mechanism;
+use crate::mobility::count;
+use crate::real::Real;
+use crate::spatial::{Mat3, Pose, Vec3};
+use crate::status::Status;
+
+type C = Complex<f64>;
+
+/// Error of a predicted step that a path is followed with, as a pure number; the later ones where paths came too close
+/// to each other.
+const PRECISIONS: [f64; 3] = [3e-3, 1e-4, 1e-6];
+
+/// Precision of the search for the generic solutions, which is made once.
+const CLOSE: f64 = 1e-4;
+
+/// Coordinates, as pure numbers, of a pose beyond which a path is taken to go to infinity: no real pose is there.
+const INFINITE: f64 = 1e5;
+
+/// The same for a path that cannot be followed further in double precision.
+const FAR: f64 = 300.0;
+
+/// Share of a path below which a step is not made shorter.
+const SMALLEST_STEP: f64 = 1e-13;
+
+/// Share of a path that may be left where it ends in a singular pose.
+const NEAR_END: f64 = 1e-9;
+
+/// Size of a Newton step, as a pure number, by which it has converged quadratically.
+const CONVERGED: f64 = 1e-9;
+
+/// Distance, as a pure number, below which two regular solutions are one.
+const SAME: f64 = 1e-7;
+
+/// The same for solutions that meet: they are known to the square root of rounding.
+const MEETING: f64 = 1e-5;
+
+/// Imaginary part, as a pure number, of a regular solution that is rounding of zero.
+const IMAGINARY: f64 = 1e-8;
+
+/// The same where solutions meet; whether it is real is decided by its residual.
+const IMAGINARY_MEETING: f64 = 1e-3;
+
+/// Residual of a real pose, relative to the longest leg, that is rounding of zero.
+const EXACT: f64 = 1e-12;
+
+/// How far, relative to those at home, the generic squared lengths are from real ones. Nearly singular poses of real
+/// mechanisms belong to solutions that run far away as the lengths change: from nearby they stay within reach.
+const GENERIC: f64 = 0.1;
+
+/// The same for the loops of lengths that permute the solutions, in turn.
+const LOOPS: [f64; 3] = [0.1, 0.5, 2.0];
+
+/// Random poses to begin with.
+const SEEDS: usize = 40;
+
+/// Loops in a row that must find nothing new before the solutions count as complete.
+const CONFIRMATIONS: usize = 15;
+
+/// Loops after which the search for all solutions is given up.
+const MOST_LOOPS: usize = 150;
+
+/// All solutions for generic complex lengths: where every search starts.
+#[derive(Clone, Debug)]
+pub struct Start {
+    squares: [C; 6],
+    poses: Vec<Pose<C>>,
+    mirror: Option<Mirror>,
+}
+
+impl Start {
+    /// Number of complex solutions of the equations for generic lengths.
+    #[must_use]
+    pub fn solutions(&self) -> usize {
+        self.poses.len() * if self.mirror.is_some() { 2 } else { 1 }
+    }
+
+    /// Adds a solution for the generic lengths, if it is a new one.
+    fn extend(&mut self, mech: &Mechanism, end: End) {
+        let End::Regular(pose) = end else { return };
+        if self.poses.is_empty() {
+            // The reflection is one only if it maps solutions to solutions: axes must agree with it too.
+            self.mirror = self.mirror.filter(|m| {
+                let mirrored = system(mech, &m.apply(&pose), &self.squares).residual;
+                mirrored.iter().all(|f| f.norm() < SAME)
+            });
+        }
+        let mirrored = self.mirror.map(|m| m.apply(&pose));
+        let same = |known: &Pose<C>| {
+            distance(mech, known, &pose) < SAME || mirrored.is_some_and(|m| distance(mech, known, &m) < SAME)
+        };
+        if !self.poses.iter().any(same) {
+            self.poses.push(pose);
+        }
+    }
+
+    /// Whether solutions come in pairs that a reflection in the base plane exchanges.
+    #[must_use]
+    pub fn symmetric(&self) -> bool {
+        self.mirror.is_some()
+    }
+}
+
+/// The reflection of a mechanism whose base joints lie in one plane and whose platform joints lie in another: it turns
+/// a pose above the base into one below it with the same leg lengths.
+#[derive(Clone, Copy, Debug)]
+struct Mirror {
+    base_normal: Vec3<f64>,
+    base_point: Vec3<f64>,
+    platform_normal: Vec3<f64>,
+    platform_point: Vec3<f64>,
+}
+
+impl Mirror {
+    fn of(mech: &Mechanism) -> Option<Self> {
+        let base: Vec<Vec3<f64>> = mech.legs.iter().map(|leg| leg.base.point).collect();
+        let platform: Vec<Vec3<f64>> = mech.legs.iter().map(|leg| leg.platform.point).collect();
+        let (base_point, base_normal) = plane(&base)?;
+        let (platform_point, platform_normal) = plane(&platform)?;
+        Some(Mirror { base_normal, base_point, platform_normal, platform_point })
+    }
+
+    /// `R' = S_B R S_P`, and the platform's plane point moves as its reflection.
+    fn apply<T: Real>(&self, pose: &Pose<T>) -> Pose<T> {
+        let two = T::lit(2.0);
+        let reflect = |a: Vec3<T>, n: Vec3<T>| a - n * (two * a.dot(n));
+        let (base, platform) = (Vec3::lift(self.base_normal), Vec3::lift(self.platform_normal));
+        let rotation = Mat3(
+            [Vec3::X, Vec3::Y, Vec3::Z]
+                .map(|e: Vec3<f64>| reflect(pose.rotation * reflect(Vec3::lift(e), platform), base)),
+        );
+        let (below, above) = (Vec3::lift(self.base_point), Vec3::lift(self.platform_point));
+        let point = below + reflect(pose.o + pose.rotation * above - below, base);
+        Pose { rotation, o: point - rotation * above }
+    }
+}
+
+/// The plane that points lie in, if they do: a point and the unit normal.
+fn plane(points: &[Vec3<f64>]) -> Option<(Vec3<f64>, Vec3<f64>)> {
+    let first = *points.first()?;
+    let far = |from: Vec3<f64>| {
+        points.iter().map(|&p| p - from).max_by(|a, b| a.norm().total_cmp(&b.norm())).unwrap_or(Vec3::zero())
+    };
+    let along = far(first);
+    let normal = points
+        .iter()
+        .map(|&p| along.cross(p - first))
+        .max_by(|a, b| a.norm().total_cmp(&b.norm()))
+        .unwrap_or(Vec3::zero());
+    let size = along.norm();
+    if !(normal.norm() > 1e-9 * size * size) {
+        return None;
+    }
+    let normal = normal.unit();
+    points.iter().all(|&p| normal.dot(p - first).abs() <= 1e-12 * size).then_some((first, normal))
+}
+
+/// A fixed generator: every search starts from the same generic lengths.
+struct Draw(u64);
+
+impl Draw {
+    /// Uniform in (-1, 1), by xorshift64*.
+    fn number(&mut self) -> f64 {
+        self.0 ^= self.0 >> 12;
+        self.0 ^= self.0 << 25;
+        self.0 ^= self.0 >> 27;
+        let bits = u32::try_from(self.0.wrapping_mul(0x2545_F491_4F6C_DD1D) >> 32).unwrap_or(0);
+        f64::from(bits) / f64::from(u32::MAX) * 2.0 - 1.0
+    }
+
+    fn complex(&mut self) -> C {
+        C::new(self.number(), self.number())
+    }
+
+    fn vector(&mut self) -> Vec3<C> {
+        Vec3::new(self.complex(), self.complex(), self.complex())
+    }
+}
+
+/// All solutions for generic complex lengths, by continuation from random complex poses \[T29\]; none where the legs
+/// and constraints are not six equations.
+#[must_use]
+pub fn start(mech: &Mechanism) -> Option<Start> {
+    if mech.actuated().count() != mech.dof() || mech.mobility.uncontrolled > 0 {
+        return None;
+    }
+    let mut draw = Draw(0x9E37_79B9_7F4A_7C15);
+    let home = squares_at(mech, &Pose::lift(&mech.home));
+    let squares: [C; 6] = std::array::from_fn(|i| home[i] * (C::lit(1.0) + draw.complex() * GENERIC));
+    let mut result = Start { squares, poses: Vec::new(), mirror: Mirror::of(mech) };
+    // Every component of the set of complex poses has its own solutions: random poses reach each of them.
+    for _ in 0..SEEDS {
+        if let Some(pose) = random_pose(mech, &mut draw) {
+            let path = Path { mech, from: squares_at(mech, &pose), to: squares, precision: CLOSE };
+            result.extend(mech, path.follow(&pose));
+        }
+    }
+    // Loops of lengths permute the solutions; one that finds nothing new leaves the known ones among themselves.
+    let mut unchanged = 0;
+    for round in 0..MOST_LOOPS {
+        let reach = LOOPS[round % LOOPS.len()];
+        let known = result.poses.len();
+        let corners: [[C; 6]; 2] = std::array::from_fn(|_| {
+            std::array::from_fn(|i| home[i] * (C::lit(1.0) + draw.complex() * reach))
+        });
+        let sides = [(squares, corners[0]), (corners[0], corners[1]), (corners[1], squares)];
+        for k in 0..known {
+            let mut end = End::Regular(result.poses[k]);
+            for (from, to) in sides {
+                if let End::Regular(pose) = end {
+                    end = Path { mech, from, to, precision: CLOSE }.follow(&pose);
+                }
+            }
+            result.extend(mech, end);
+        }
+        unchanged = if result.poses.len() == known { unchanged + 1 } else { 0 };
+        if unchanged == CONFIRMATIONS {
+            return (!result.poses.is_empty()).then_some(result);
+        }
+    }
+    None
+}
+
+/// A random complex pose that satisfies the constraints, about as far from home as the mechanism is large.
+fn random_pose(mech: &Mechanism, draw: &mut Draw) -> Option<Pose<C>> {
+    let length = mech.legs.iter().map(|leg| leg::position(leg, &mech.home).length).fold(0.0, f64::max);
+    let home = Pose::lift(&mech.home);
+    let mut pose = Pose {
+        rotation: Mat3::cayley(draw.vector() * C::lit(1.5)) * home.rotation,
+        o: home.o + draw.vector() * C::lit(length),
+    };
+    let free: [[C; 6]; 6] = std::array::from_fn(|_| std::array::from_fn(|_| draw.complex()));
+    let dof = mech.dof();
+    for _ in 0..30 {
+        let System { residual, matrix } = system(mech, &pose, &[C::lit(0.0); 6]);
+        let rows = std::array::from_fn(|i| if i < dof { free[i] } else { matrix[i] });
+        let rhs: [C; 6] = std::array::from_fn(|i| if i < dof { C::lit(0.0) } else { -residual[i] });
+        let step = solve(rows, rhs).x;
+        pose = pose.stepped(&step_of(mech, step, C::lit(1.0)));
+        let size = norm(&step);
+        if size < 1e-14 {
+            return Some(pose);
+        }
+        if !(size < INFINITE) {
+            return None;
+        }
+    }
+    None
+}
+
+/// Squared lengths of the actuated legs.
+fn squares_at(mech: &Mechanism, pose: &Pose<C>) -> [C; 6] {
+    let mut squares = [C::lit(0.0); 6];
+    for (square, (_, leg)) in squares.iter_mut().zip(mech.actuated()) {
+        let (_, r) = leg::vectors(leg, pose);
+        *square = r.dot(r);
+    }
+    squares
+}
+
+fn norm(x: &[C; 6]) -> f64 {
+    x.iter().map(C::norm_sqr).sum::<f64>().sqrt()
+}
+
+fn modulus(v: Vec3<C>) -> f64 {
+    (v.x.norm_sqr() + v.y.norm_sqr() + v.z.norm_sqr()).sqrt()
+}
+
+/// Distance of two poses as a pure number: of the columns of R, and of the points o in characteristic lengths,
+/// relative to how far off o is.
+fn distance(mech: &Mechanism, a: &Pose<C>, b: &Pose<C>) -> f64 {
+    let turned = a.rotation.0.iter().zip(b.rotation.0).map(|(&p, q)| modulus(p - q)).fold(0.0, f64::max);
+    turned.max(modulus(a.o - b.o) / (mech.characteristic_length + modulus(a.o)))
+}
+
+/// How a path ends.
+#[derive(Clone, Copy, Debug)]
+enum End {
+    Regular(Pose<C>),
+    /// At a solution where several paths end.
+    Singular(Pose<C>),
+    Infinite,
+    /// On the way: what it leads to is not known.
+    Lost,
+}
+
+/// A straight path of squared lengths from t = 0 to t = 1.
+struct Path<'a> {
+    mech: &'a Mechanism,
+    from: [C; 6],
+    to: [C; 6],
+    precision: f64,
+}
+
+impl Path<'_> {
+    fn squares(&self, t: f64) -> [C; 6] {
+        std::array::from_fn(|i| self.from[i] + (self.to[i] - self.from[i]) * t)
+    }
+
+    /// The rate of the step coordinates ξ along the path at the pose `start` stepped by ξ: the twist from J, turned into
+    /// the rate of the Cayley map's argument, `w' = ω - w×ω/2 + w (w·ω)/4` \[T29\].
+    fn rate(&self, start: &Pose<C>, xi: &[C; 6], squares: &[C; 6]) -> [C; 6] {
+        let mech = self.mech;
+        let pose = start.stepped(&step_of(mech, *xi, C::lit(1.0)));
+        let System { matrix, .. } = system(mech, &pose, squares);
+        let scale = mech.characteristic_length;
+        let half = 0.5 / (scale * scale);
+        let rhs = std::array::from_fn(|i| (self.to[i] - self.from[i]) * half);
+        let [a, b, c, p, q, r] = solve(matrix, rhs).x;
+        let (w, omega) = (Vec3::new(xi[3], xi[4], xi[5]), Vec3::new(p, q, r));
+        let turned = omega - w.cross(omega) * C::lit(0.5) + w * (w.dot(omega) * 0.25);
+        [a, b, c, turned.x, turned.y, turned.z]
+    }
+
+    /// Newton steps at fixed lengths; the sizes of the first and the last.
+    fn correct(&self, pose: &mut Pose<C>, squares: &[C; 6], steps: usize) -> (f64, f64) {
+        let (mut first, mut last) = (f64::NAN, f64::NAN);
+        for k in 0..steps {
+            let System { residual, matrix } = system(self.mech, pose, squares);
+            let step = solve(matrix, residual.map(|f| -f)).x;
+            *pose = pose.stepped(&step_of(self.mech, step, C::lit(1.0)));
+            last = norm(&step);
+            if k == 0 {
+                first = last;
+            }
+            if !(last > 1e-14) {
+                break;
+            }
+        }
+        let size = 1.0 + modulus(pose.o) / self.mech.characteristic_length;
+        (first / size, last / size)
+    }
+
+    /// Follows the path by the classical Runge-Kutta method and Newton corrections.
+    fn follow(&self, start: &Pose<C>) -> End {
+        let scale = self.mech.characteristic_length;
+        let far = |pose: &Pose<C>| (modulus(pose.o) / scale).max(modulus(pose.rotation.0[0]));
+        let (mut pose, mut t, mut h) = (*start, 0.0_f64, 0.1_f64);
+        // Before a singular end the path bends like a square root: steps shrink with what is left.
+        while t < 1.0 && h > SMALLEST_STEP {
+            h = h.min(1.0 - t);
+            let (middle, end) = (self.squares(t + 0.5 * h), self.squares(t + h));
+            let along = |k: &[C; 6], share: f64| k.map(|e| e * share);
+            let k1 = self.rate(&pose, &[C::lit(0.0); 6], &self.squares(t));
+            let k2 = self.rate(&pose, &along(&k1, 0.5 * h), &middle);
+            let k3 = self.rate(&pose, &along(&k2, 0.5 * h), &middle);
+            let k4 = self.rate(&pose, &along(&k3, h), &end);
+            let step: [C; 6] = std::array::from_fn(|i| (k1[i] + (k2[i] + k3[i]) * 2.0 + k4[i]) * (h / 6.0));
+            let mut next = pose.stepped(&step_of(self.mech, step, C::lit(1.0)));
+            let (error, rest) = self.correct(&mut next, &end, 2);
+            let good = error <= self.precision && rest <= 0.1 * self.precision * self.precision.max(error);
+            if good {
+                (pose, t) = (next, t + h);
+            }
+            // The error grows with the fifth power of the step.
+            let factor = 0.8 * (self.precision / error).powf(0.2);
+            let factor = if factor.is_nan() { 0.25 } else { factor.clamp(0.25, 4.0) };
+            h *= if good { factor } else { factor.min(0.5) };
+            if !(far(&pose) < INFINITE) {
+                return End::Infinite;
+            }
+        }
+        if t < 1.0 - NEAR_END {
+            return if far(&pose) > FAR { End::Infinite } else { End::Lost };
+        }
+        let (_, last) = self.correct(&mut pose, &self.to, 40);
+        if t >= 1.0 && last <= CONVERGED { End::Regular(pose) } else { End::Singular(pose) }
+    }
+}
+
+/// A real pose with the lengths that were asked for.
+#[derive(Clone, Copy, Debug)]
+pub struct Mode {
+    pub pose: Pose<f64>,
+    /// Sign of det J.
+    pub sign: f64,
+    /// Whether o lies on that side of the base joints on which it lies at home.
+    pub above: bool,
+    /// Solutions that meet here: more than one at a singular pose.
+    pub multiplicity: u32,
+    /// Whether the Jacobian is singular to the square root of rounding: the pose is then known to it as well.
+    pub singular: bool,
+    pub residual: f64,
+}
+
+/// The modes, highest first.
+#[derive(Clone, Debug)]
+pub struct Modes {
+    pub modes: Vec<Mode>,
+    /// Singular if modes meet, not converged if a path was lost, so that a mode may be missing.
+    pub status: Status,
+}
+
+/// Every real pose with the given lengths of the actuated legs \[T28\].
+#[must_use]
+pub fn assembly_modes(mech: &Mechanism, start: &Start, lengths: &[f64]) -> Modes {
+    if !lengths.iter().all(|l| *l >= 0.0 && l.is_finite()) {
+        return Modes { modes: vec![], status: Status::InvalidInput };
+    }
+    let squares: [f64; 6] = std::array::from_fn(|i| lengths.get(i).map_or(0.0, |l| l * l));
+    let to = squares.map(C::lit);
+    let mut ends = Vec::new();
+    let mut complete = false;
+    for precision in PRECISIONS {
+        let path = Path { mech, from: start.squares, to, precision };
+        ends = start.poses.iter().map(|pose| path.follow(pose)).collect::<Vec<End>>();
+        complete = all_kept(mech, &ends);
+        if complete {
+            break;
+        }
+    }
+    let mut modes: Vec<Mode> = Vec::new();
+    for end in ends {
+        let (End::Regular(pose) | End::Singular(pose)) = end else { continue };
+        let mirrored = start.mirror.map(|m| m.apply(&pose));
+        for pose in std::iter::once(pose).chain(mirrored) {
+            if let Some(mode) = real_mode(mech, &squares, &pose) {
+                keep(mech, &mut modes, mode);
+            }
+        }
+    }
+    let up = upward(mech);
+    let height = |m: &Mode| up.dot(m.pose.o);
+    modes.sort_by(|a, b| height(b).total_cmp(&height(a)));
+    let status = match (complete, modes.iter().any(|m| m.singular)) {
+        (false, _) => Status::NotConverged,
+        (true, true) => Status::Singular,
+        (true, false) => Status::Ok,
+    };
+    Modes { modes, status }
+}
+
+/// Whether no path was lost, nor left for another: then two would have one regular end.
+fn all_kept(mech: &Mechanism, ends: &[End]) -> bool {
+    ends.iter().enumerate().all(|(i, end)| match end {
+        End::Regular(a) => !ends[..i].iter().any(|other| match other {
+            End::Regular(b) => distance(mech, a, b) < SAME,
+            _ => false,
+        }),
+        End::Singular(_) | End::Infinite => true,
+        End::Lost => false,
+    })
+}
+
+/// The real pose that a complex solution is, if it is one.
+fn real_mode(mech: &Mechanism, squares: &[f64; 6], pose: &Pose<C>) -> Option<Mode> {
+    let o = pose.o * C::lit(1.0 / mech.characteristic_length);
+    let parts = pose.rotation.0.iter().flat_map(|c| c.array()).chain(o.array());
+    let imaginary = parts.map(|e| e.im.abs()).fold(0.0, f64::max);
+    if !(imaginary <= IMAGINARY_MEETING) {
+        return None;
+    }
+    let real = |v: Vec3<C>| v.map(|e| e.re);
+    let [x, y, _] = pose.rotation.0.map(real);
+    let (x, z) = (x.unit(), x.cross(y).unit());
+    let guess = Pose { rotation: Mat3::from_columns(x, z.cross(x), z), o: real(pose.o) };
+    let Found { pose: found, sign, residual, status, .. } = forward::polish(mech, squares, &guess);
+    let longest = squares.iter().copied().fold(0.0, f64::max).sqrt();
+    let moved = distance(mech, &Pose::lift(&found), pose);
+    // Off the real poses there are real ones nearby only where modes meet.
+    let real = imaginary <= IMAGINARY || status == Status::Singular;
+    if !(real && residual <= EXACT * longest && moved <= 10.0 * imaginary + MEETING) {
+        return None;
+    }
+    let above = upward(mech).dot(found.o - mech.legs[0].base.point) > 0.0;
+    let singular = status == Status::Singular;
+    Some(Mode { pose: found, sign, above, multiplicity: 1, singular, residual })
+}
+
+/// Adds a mode, or counts it with the one that it meets.
+fn keep(mech: &Mechanism, modes: &mut Vec<Mode>, mode: Mode) {
+    let lifted = Pose::lift(&mode.pose);
+    let same = |m: &&mut Mode| {
+        let limit = if m.singular || mode.singular { MEETING } else { SAME };
+        distance(mech, &Pose::lift(&m.pose), &lifted) < limit
+    };
+    match modes.iter_mut().find(same) {
+        Some(known) => known.multiplicity += 1,
+        None => modes.push(mode),
+    }
+}
+
+/// The unit normal of the plane of the base joints, or else the direction from their middle, to the side where the
+/// platform is at home.
+fn upward(mech: &Mechanism) -> Vec3<f64> {
+    let points: Vec<Vec3<f64>> = mech.legs.iter().map(|leg| leg.base.point).collect();
+    let middle = points.iter().fold(Vec3::zero(), |sum, &p| sum + p) * (1.0 / count(points.len()));
+    let home = mech.home.o - middle;
+    match plane(&points) {
+        Some((_, normal)) if normal.dot(home) < 0.0 => -normal,
+        Some((_, normal)) => normal,
+        None => home.unit(),
+    }
+}
