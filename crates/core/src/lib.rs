@@ -5,12 +5,14 @@
 
 pub mod assembly;
 pub mod batch;
+pub mod clearance;
 pub mod constraint;
 pub mod coordinates;
 pub mod dynamics;
 pub mod jacobian;
 pub mod joints;
 pub mod leg;
+pub mod limits;
 pub mod linear;
 pub mod mechanism;
 pub mod mobility;

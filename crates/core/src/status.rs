@@ -24,10 +24,12 @@ pub enum Status {
     BranchJump = 8,
     /// A leg leans further from a joint's cone axis than the cone allows; the numbers stand.
     OutOfCone = 9,
+    /// A revolute joint or a rod turns beyond its range; the numbers stand.
+    OutOfAngle = 11,
 }
 
 impl Status {
-    pub const ALL: [Status; 10] = [
+    pub const ALL: [Status; 11] = [
         Status::Ok,
         Status::NoBranch,
         Status::Fold,
@@ -38,6 +40,7 @@ impl Status {
         Status::InvalidInput,
         Status::BranchJump,
         Status::OutOfCone,
+        Status::OutOfAngle,
     ];
 
     /// What it means and what helps.
@@ -73,6 +76,9 @@ impl Status {
             }
             Status::OutOfCone => {
                 "a joint turns beyond its cone limit; the numbers stand, the machine cannot reach the pose"
+            }
+            Status::OutOfAngle => {
+                "a revolute joint or a rod turns beyond its range; the numbers stand, the machine cannot reach the pose"
             }
             Status::InvalidInput => {
                 "the input holds NaN or infinity, or its rotation is not a rotation matrix"
