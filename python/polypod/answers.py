@@ -153,6 +153,42 @@ class Conditioning(NamedTuple):
     status: Codes
 
 
+class Limits(NamedTuple):
+    """How far states are from the limits of their mechanism [T35]; m limits in the order of `limit_list`."""
+
+    names: tuple[str, ...]
+    """Such as "stroke max of leg 3"."""
+    margins: Array
+    """(..., m): signed slack of each in its own unit, positive inside; NaN where it is not determined."""
+    relative: Array
+    """(..., m): the same as a part of the limit's scale, a pure number."""
+    binding: NDArray[np.int64]
+    """(...): index of the limit with the least relative slack; -1 where there is none."""
+    within: NDArray[np.bool_]
+    """(...): whether no limit is passed; False where a margin is NaN or the state has no answer."""
+    status: Codes
+
+
+@dataclass(frozen=True)
+class Limit:
+    """One limit of a mechanism."""
+
+    name: str
+    kind: str
+    """stroke min, stroke max, base cone, platform cone, base angle, platform angle, rod angle, leg clearance,
+    platform clearance, conditioning, force min or force max."""
+    legs: tuple[str, ...]
+    """Names of the legs that it concerns."""
+    unit: str
+    """m, rad, N or 1: of bounds, scale and margins."""
+    least: float
+    """-inf where it has no lower bound."""
+    greatest: float
+    """inf where it has no upper bound."""
+    scale: float
+    """What relative slack is measured by."""
+
+
 @dataclass(frozen=True)
 class GraphLink:
     """A link of the topology graph; `joints` are indices."""

@@ -25,6 +25,8 @@ from polypod.answers import (
     InverseDynamics,
     InverseKinematics,
     Kinematics,
+    Limit,
+    Limits,
     Mobility,
     Power,
     Published,
@@ -33,6 +35,7 @@ from polypod.answers import (
 from polypod.errors import CoordinateError, Fault, MechanismError, ShapeError, UnknownNameError, alternatives
 from polypod.schema import read_spec
 from polypod.status import Status
+from polypod.units import readable
 
 NEAR_SINGULAR = 0.01
 """Smallest singular value (a pure number) below which a pose is called nearly singular."""
@@ -181,15 +184,11 @@ class Mechanism:
                 "The platform can move there with hardly any change of the leg lengths, and forces are "
                 "large; stay clear of it."
             )
-        lengths = self.inverse_kinematics(self.home).lengths
-        for name, length, (least, greatest) in zip(self.leg_names, lengths, self.stroke, strict=True):
-            if not least <= length <= greatest:
-                notes.append(
-                    f"leg {name} is {1e3 * length:.1f} mm long at the centre pose, outside its stroke of "
-                    f"{1e3 * least:.1f} to {1e3 * greatest:.1f} mm."
-                )
-        if self.inverse_kinematics(self.home).status == Status.OUT_OF_CONE:
-            notes.append("a joint is beyond its cone limit at the centre pose.")
+        notes += [
+            f"beyond a limit at its centre pose: {limit.name}, by {readable(-margin, limit.unit)}."
+            for limit, margin in zip(self.limit_list, self.limits(self.home).margins, strict=True)
+            if margin < 0.0
+        ]
         if mobility.redundant:
             several = mobility.redundant > 1
             notes.append(
@@ -430,6 +429,58 @@ class Mechanism:
         """Energies and every power of their balance [T17]. Arguments as for `inverse_dynamics`."""
         shape, args = self._loaded_states(pose, twist, acceleration, wrench, wrench_axes)
         return Power(**_shaped(self._core.power(*args), shape))
+
+    # --- limits ------------------------------------------------------------------------------------------
+
+    @property
+    def limit_list(self) -> tuple[Limit, ...]:
+        """All limits that the file sets: joints, then clearances, conditioning, forces [T35]."""
+        return tuple(
+            Limit(name, kind, tuple(self.leg_names[i] for i in legs), unit, least, greatest, scale)
+            for name, kind, legs, unit, least, greatest, scale in self._core.limit_list()
+        )
+
+    def limits(
+        self,
+        pose: ArrayLike,
+        wrench: ArrayLike | None = None,
+        wrench_axes: str = "base",
+        *,
+        twist: ArrayLike | None = None,
+        acceleration: ArrayLike | None = None,
+    ) -> Limits:
+        """How far a pose is from every limit, and which binds [T35-T38].
+
+        Forces are those that hold the load at rest, or those of the motion where one is given. At a singular
+        pose (status SINGULAR) the margins of forces are NaN and the others stand.
+
+        Args:
+            pose: (..., 4, 4).
+            wrench: load on the platform at o, (..., 6), N and N m; the mechanism's own by default. Only the
+                limits of forces depend on it.
+            wrench_axes: the axes of `wrench`, "base" or "platform".
+            twist: (..., 6); rest by default.
+            acceleration: (..., 6); zero by default.
+
+        >>> import polypod as pp
+        >>> mech = pp.load("lu-3spu-2rpu-r")
+        >>> limits = mech.limits(mech.home)
+        >>> limits.names[limits.binding], limits.margins.min().round(4), bool(limits.within)
+        ('stroke min of leg 2', np.float64(0.0941), True)
+        """
+        rest = np.zeros(6)
+        twist, acceleration = (rest if a is None else a for a in (twist, acceleration))
+        shape, args = self._loaded_states(pose, twist, acceleration, wrench, wrench_axes)
+        out = _shaped(self._core.limits(*args), shape)
+        margins, binding, status = out["margins"], out["binding"], out["status"]
+        return Limits(
+            tuple(limit.name for limit in self.limit_list),
+            margins,
+            out["relative"],
+            np.where(np.isnan(binding), -1, binding).astype(np.int64),
+            (margins >= 0.0).all(axis=-1) & np.isin(status, [s for s in Status if s.has_answer]),
+            status,
+        )
 
     def coupled_forces(
         self, pose: ArrayLike, constraint: ArrayLike, *, as_printed: bool = False

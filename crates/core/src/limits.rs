@@ -64,6 +64,16 @@ pub enum Bound {
 }
 
 impl Bound {
+    /// Least and greatest value, infinite where there is none.
+    #[must_use]
+    pub fn ends(self) -> (f64, f64) {
+        match self {
+            Bound::Least(least) => (least, f64::INFINITY),
+            Bound::Most(most) => (f64::NEG_INFINITY, most),
+            Bound::Between(min, max) => (min, max),
+        }
+    }
+
     /// Signed slack of a value \[T35\]; of an angle, its arc to the nearer end of the range \[T36\].
     #[inline(always)]
     pub fn margin<T: Trig>(self, value: T) -> T {

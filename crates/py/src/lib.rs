@@ -7,6 +7,7 @@ use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray1};
 use polypod_core::assembly::assemble;
 use polypod_core::batch::{self, Coordinates, Loads, States, Table};
 use polypod_core::coordinates::Set;
+use polypod_core::limits::Limit;
 use polypod_core::mechanism::Mechanism;
 use polypod_core::spec::{Axes, Fault, Spec};
 use polypod_core::status::Status;
@@ -53,6 +54,7 @@ fn arrays(py: Python<'_>, table: Table) -> PyResult<Bound<'_, PyDict>> {
     Ok(result)
 }
 
+type LimitRow = (String, &'static str, Vec<usize>, &'static str, f64, f64, f64);
 type CoordinateSet = (&'static str, Vec<&'static str>, Option<Vec<bool>>);
 
 #[pyclass(name = "Mechanism", frozen)]
@@ -237,6 +239,32 @@ impl PyMechanism {
         let loads = loads(wrenches.as_ref(), platform_axes, states.poses)?;
         let table = py.detach(|| batch::power(&self.0, &states, &loads));
         arrays(py, table)
+    }
+
+    #[pyo3(signature = (poses, twists, accelerations, wrenches, platform_axes))]
+    fn limits<'py>(
+        &self,
+        py: Python<'py>,
+        poses: Array<'py>,
+        twists: Array<'py>,
+        accelerations: Array<'py>,
+        wrenches: Option<Array<'py>>,
+        platform_axes: bool,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        let states = states(&poses, &twists, &accelerations)?;
+        let loads = loads(wrenches.as_ref(), platform_axes, states.poses)?;
+        let table = py.detach(|| batch::limits(&self.0, &states, &loads));
+        arrays(py, table)
+    }
+
+    /// Name, kind, legs (from 0), unit, least and greatest value (infinite where there is none) and scale of each limit.
+    fn limit_list(&self) -> Vec<LimitRow> {
+        let mech = &self.0;
+        let row = |l: &Limit| {
+            let (least, most) = l.bound.ends();
+            (l.name.clone(), l.kind(), l.legs(mech), l.unit(), least, most, l.scale)
+        };
+        mech.limits.iter().map(row).collect()
     }
 
     fn platform_twist<'py>(

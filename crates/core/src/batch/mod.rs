@@ -4,6 +4,7 @@ mod checks;
 mod coordinates;
 mod dynamics;
 mod kinematics;
+mod limits;
 
 pub use checks::CONSTRAINT_TOLERANCE;
 pub use coordinates::{Coordinates, coordinate_values, states};
@@ -11,6 +12,8 @@ pub use dynamics::{Loads, coupled_forces, inverse_dynamics, power};
 pub use kinematics::{
     conditioning, hessians, inverse_kinematics, jacobians, kinematics, platform_acceleration, platform_twist,
 };
+
+pub use limits::limits;
 
 use crate::mechanism::Mechanism;
 use crate::spatial::{Acceleration, Motion, Twist};
