@@ -2,7 +2,7 @@
 
 use crate::constraint;
 use crate::leg;
-use crate::limits::Limit;
+use crate::limits;
 use crate::mechanism::Mechanism;
 use crate::quadratic::quadratic;
 use crate::spatial::{Acceleration, Mat3, Pose, Twist, Vec3};
@@ -118,11 +118,10 @@ pub(super) fn check_finite(values: &[f64]) -> Status {
     if values.iter().all(|x| x.is_finite()) { Status::Ok } else { Status::InvalidInput }
 }
 
-/// The first limit of a joint that a pose breaks: strokes, then cones, then angles.
+/// The first limit of a joint that a pose breaks.
 pub(super) fn limit_status(mech: &Mechanism, pose: &Pose<f64>) -> Status {
-    let kept = |limit: &Limit| limit.margin(mech, pose, None) >= 0.0;
-    let joints = mech.limits.iter().take_while(|limit| limit.status() != Status::Ok);
-    joints.filter(|limit| !kept(limit)).map(Limit::status).next().unwrap_or(Status::Ok)
+    let of_joints = mech.limits.iter().take_while(|limit| limit.status() != Status::Ok);
+    limits::status(of_joints.map(|limit| (limit, limit.margin(mech, pose, None))))
 }
 
 pub(super) fn outcome(mech: &Mechanism, solution: &[f64; 6], pivots: f64) -> Status {

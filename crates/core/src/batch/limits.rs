@@ -1,6 +1,6 @@
 //! Limits of many states.
 
-use super::checks::{check_finite, limit_status, outcome, then};
+use super::checks::{check_finite, outcome, then};
 use super::dynamics::Loads;
 use super::{States, Table};
 use crate::dynamics;
@@ -26,9 +26,12 @@ pub fn limits(mech: &Mechanism, states: &States, loads: &Loads) -> Table {
             continue;
         }
         let forces = if needs_forces { forces(mech, &platform, load) } else { None };
-        let undetermined = needs_forces && forces.is_none();
-        table.status[i] = if undetermined { Status::Singular } else { limit_status(mech, &platform.pose) };
         limits::margins(mech, &platform.pose, forces.as_ref(), &mut found);
+        table.status[i] = if needs_forces && forces.is_none() {
+            Status::Singular
+        } else {
+            limits::status(mech.limits.iter().zip(found.iter().copied()))
+        };
         table.set(margins, i, 0, &found);
         if let Some(k) = limits::binding(mech, &found) {
             table.set(binding, i, 0, &[k as f64]);
