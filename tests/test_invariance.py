@@ -1,6 +1,7 @@
 """What must not change when a mechanism is described otherwise: moved, turned, mirrored, scaled, renumbered.
 
-Each mechanism gets bodies of no symmetry, damping and a load; then all results up to power are compared.
+Each mechanism gets bodies of no symmetry, damping, a load and limits of all kinds; then all results up to
+power and the relative slack of all limits are compared.
 """
 
 import copy
@@ -44,12 +45,14 @@ def body(rng: np.random.Generator) -> Tables:
 
 
 def tables_of(name: str) -> Tables:
-    """The mechanism in SI, with vectors as arrays, and bodies, damping and a load that hide no term."""
+    """The mechanism in SI, with vectors as arrays, and bodies, damping, load and limits that hide no term."""
     rng = np.random.default_rng(SEED)
     spec = pp.load(name if name == NAMES[0] else DATA / f"{name}.toml").geometry
-    rods = [rod | {"body": None} | body(rng) for rod in spec["rods"]]
+    rods = [rod | {"body": None, "range": [-1.5, 1.5]} | body(rng) for rod in spec["rods"]]
     for leg in spec["legs"]:
-        leg |= {"cylinder": body(rng), "piston": body(rng)}
+        leg |= {"cylinder": body(rng), "piston": body(rng), "radius": 0.02, "force": [-2e3, 4e3]}
+        if leg["base"]["joint"] == "R":
+            leg["base"]["range"] = [-1.2, 1.7]
         if leg["base"]["rod"] is not None:
             leg["base"]["rod"] = rods[leg["base"]["rod"]]["name"]
     tables = {key: spec[key] for key in ("name", "home", "tool", "legs")} | {
@@ -58,6 +61,7 @@ def tables_of(name: str) -> Tables:
         | {"gravity": [1.0, -2.0, -9.0]},
         "load": {"force": [30.0, -20.0, 100.0], "torque": [5.0, 10.0, -15.0], "axes": "platform"},
         "platform": body(rng),
+        "limits": {"sigma_min": 0.01, "clearance": 0.004},
         "rods": rods,
     }
     result: Tables = arrays(tables)
@@ -74,15 +78,17 @@ def arrays(value: Any) -> Any:
 
 
 def plain(value: Any) -> Any:
-    """Arrays as lists, as a file has them, strokes as tables."""
+    """Arrays as lists, as a file has them, pairs of limits as tables."""
     if isinstance(value, dict):
-        return {k: stroke(v) if k == "stroke" else plain(v) for k, v in value.items()}
+        return {
+            k: ends(v) if isinstance(v, np.ndarray) and len(v) == 2 else plain(v) for k, v in value.items()
+        }
     if isinstance(value, list):
         return [plain(v) for v in value]
     return value.tolist() if isinstance(value, np.ndarray | np.generic) else value
 
 
-def stroke(limits: Array) -> Tables:
+def ends(limits: Array) -> Tables:
     return dict(zip(("min", "max"), limits.tolist(), strict=True))
 
 
@@ -120,6 +126,8 @@ def chain(mech: pp.Mechanism, states: States) -> dict[str, Array]:
         assert np.isin(part.status, (Status.OK, Status.OUT_OF_STROKE)).all()
         results |= part._asdict()
     results |= mech.conditioning(states.pose)._asdict() | {"status": results["status"]}
+    limits = mech.limits(states.pose, twist=states.twist, acceleration=states.acceleration)
+    results["relative slack"] = limits.relative
     powers = [
         results[k] for k in ("actuators", "load", "damping", "friction", "kinetic_rate", "potential_rate")
     ]
@@ -180,15 +188,16 @@ class Change:
         new["load"]["force"] = force * A @ old["load"]["force"]
         new["load"]["torque"] = torque * sign * A @ old["load"]["torque"]
         bodily(new["platform"], P)
+        new["limits"]["clearance"] *= s
         for rod in new["rods"]:
             rod["point"], rod["axis"] = s * (Q @ rod["point"] + self.shift), Q @ rod["axis"]
             bodily(rod, np.diag([1, sign, 1]))  # in the rod's axes (L, n, L × n)
         for leg in new["legs"]:
             leg["stroke"] = s * leg["stroke"]
+            leg["radius"] *= s
+            leg["force"] = force * leg["force"]
             bodily(leg["cylinder"], np.diag([sign, 1, 1]))  # in the leg's axes (n, δ, n × δ)
             bodily(leg["piston"], np.diag([sign, 1, 1]))
-            if "radius" in leg:
-                leg["radius"] *= s
             for joint, A, shift in ((leg["base"], Q, self.shift), (leg["platform"], P, np.zeros(3))):
                 joint["point"] = s * (A @ joint["point"] + shift)
                 if "axis" in joint:
@@ -320,7 +329,10 @@ def test_order_of_the_legs(tables: Tables) -> None:
     tables["legs"] = [tables["legs"][i] for i in order]
     other = mechanism(tables)
     assert other.leg_names == tuple(mech.leg_names[i] for i in order)
-    same(chain(other, states), expected)
+    found = chain(other, states)
+    for results in (expected, found):  # limits stand in the order of the legs
+        results["relative slack"] = np.sort(results["relative slack"], axis=-1)
+    same(found, expected)
 
 
 def test_leg_that_the_rod_follows_changes_no_force() -> None:
@@ -338,8 +350,8 @@ def test_leg_that_the_rod_follows_changes_no_force() -> None:
 
 
 KINDS = {
-    **dict.fromkeys(("point", "position", "center", "radius", "stroke"), "length"),
-    **dict.fromkeys(("angle", "rotation_vector"), "angle"),
+    **dict.fromkeys(("point", "position", "center", "radius", "stroke", "clearance"), "length"),
+    **dict.fromkeys(("angle", "rotation_vector", "range"), "angle"),
     **{kind: kind for kind in ("mass", "inertia", "force", "torque")},
     "gravity": "acceleration",
 }

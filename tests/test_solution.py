@@ -276,7 +276,8 @@ def test_impossible_poses_are_gaps_and_nothing_else() -> None:
     given |= {f"coordinate_second_rate_{name}" for name in motion.coordinates} | {"status", "wrench"}
     for name in given:
         assert np.isfinite(data[name]).all(), name
-    for name in {*data.data_vars} - given - {"actuator_work"}:
+    assert np.array_equal(data["binding_limit"] == -1, impossible)
+    for name in {*data.data_vars} - given - {"actuator_work", "binding_limit"}:
         known = np.isfinite(data[name].values.reshape(201, -1)).any(axis=1)
         assert np.array_equal(known, ~impossible), name
     # Work is known up to the first gap: what comes after it depends on what happened there.

@@ -18,6 +18,7 @@ from polypod.errors import (
     ShapeError,
     SolutionError,
     UnknownNameError,
+    UnsupportedError,
 )
 from polypod.mechanism import Mechanism, list_mechanisms, load
 from polypod.status import Status
@@ -49,6 +50,7 @@ __all__ = [
     "SolutionError",
     "Status",
     "UnknownNameError",
+    "UnsupportedError",
     "__version__",
     "errors",
     "list_mechanisms",

@@ -44,6 +44,39 @@ class InverseKinematics(NamedTuple):
     status: Codes
 
 
+class ForwardKinematics(NamedTuple):
+    """The platform for given leg lengths [T25-T27]."""
+
+    pose: Array
+    """(..., 4, 4): NaN where none was found."""
+    residual: Array
+    """(...): the largest error of a length or of a constraint, m."""
+    iterations: Array
+    """(...): Newton steps."""
+    status: Codes
+
+
+class AssemblyModes(NamedTuple):
+    """All real poses for given leg lengths, highest first [T28]; NaN beyond `count`."""
+
+    pose: Array
+    """(..., m, 4, 4), m the largest count of the batch."""
+    count: NDArray[np.int64]
+    """(...): number of modes."""
+    determinant_sign: Array
+    """(..., m): sign of det J, 0 where modes meet."""
+    above: Array
+    """(..., m): 1 on that side of the base joints where the platform is at home, 0 on the other."""
+    multiplicity: Array
+    """(..., m): modes that meet in this one; 1 for a regular one."""
+    residual: Array
+    """(..., m): the largest error of a length or of a constraint, m."""
+    mode_status: Codes
+    """(..., m): `Status` of each pose: within its limits or not; INVALID_INPUT beyond `count`."""
+    status: Codes
+    """(...): SINGULAR where modes meet, NOT_CONVERGED where one may be missing."""
+
+
 class Kinematics(NamedTuple):
     """Motion of legs, rods, links and joints [Eq. 2-39], base axes, SI."""
 
@@ -151,6 +184,42 @@ class Conditioning(NamedTuple):
     condition: Array
     """(...): their quotient, sigma_max / sigma_min."""
     status: Codes
+
+
+class Limits(NamedTuple):
+    """How far states are from the limits of their mechanism [T35]; m limits in the order of `limit_list`."""
+
+    names: tuple[str, ...]
+    """Such as "stroke max of leg 3"."""
+    margins: Array
+    """(..., m): signed slack of each in its own unit, positive inside; NaN where it is not determined."""
+    relative: Array
+    """(..., m): the same as a part of the limit's scale, a pure number."""
+    binding: NDArray[np.int64]
+    """(...): index of the limit with the least relative slack; -1 where there is none."""
+    within: NDArray[np.bool_]
+    """(...): whether no limit is passed; False where a margin is NaN or the state has no answer."""
+    status: Codes
+
+
+@dataclass(frozen=True)
+class Limit:
+    """One limit of a mechanism."""
+
+    name: str
+    kind: str
+    """stroke min, stroke max, base cone, platform cone, base angle, platform angle, rod angle, leg clearance,
+    platform clearance, conditioning, force min or force max."""
+    legs: tuple[str, ...]
+    """Names of the legs that it concerns."""
+    unit: str
+    """m, rad, N or 1: of bounds, scale and margins."""
+    least: float
+    """-inf where it has no lower bound."""
+    greatest: float
+    """inf where it has no upper bound."""
+    scale: float
+    """What relative slack is measured by."""
 
 
 @dataclass(frozen=True)

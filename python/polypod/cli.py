@@ -198,8 +198,29 @@ def _print_mechanism(out: Console, facts: dict[str, Any]) -> None:
         table.add_row(_CONDITIONING[key], _g(centre[key]))
     table.add_row("characteristic length / mm", f"{1e3 * facts['characteristic_length']:.1f}")
     out.print(table)
+    _print_limits(out, facts["limits"])
     for warning in facts["warnings"]:
         out.print(f"[bold yellow]Warning:[/bold yellow] {escape(warning)}")
+
+
+def _print_limits(out: Console, limits: list[dict[str, Any]]) -> None:
+    """What the mechanism file allows, and the slack that the centre pose leaves."""
+    from polypod.units import readable
+
+    if not limits:
+        return
+    table = _table("Limits", "limit", "allowed>", "slack at home>", "relative>", "")
+    for row in limits:
+        least, greatest = (None if end is None else readable(end, row["unit"]) for end in row["allowed"])
+        if least is None or greatest is None:
+            allowed = f"at most {greatest}" if least is None else f"at least {least}"
+        else:
+            allowed = f"{least} to {greatest}"
+        slack = "none" if row["margin"] is None else readable(row["margin"], row["unit"])
+        table.add_row(
+            escape(row["name"]), allowed, slack, _g(row["relative"]), "binds" if row["binds"] else ""
+        )
+    out.print(table)
 
 
 _CONDITIONING = {
@@ -303,6 +324,8 @@ def _length_mm(leg: dict[str, Any]) -> str:
 
 
 def _print_solution(out: Console, facts: dict[str, Any]) -> None:
+    from polypod.units import readable
+
     out.print(
         f"[bold]{escape(facts['mechanism'])}[/bold] along [bold]{escape(facts['motion'])}[/bold] "
         f"({escape(facts['coordinate_set'])} coordinates): {facts['states']} states "
@@ -332,7 +355,25 @@ def _print_solution(out: Console, facts: dict[str, Any]) -> None:
         whole.add_row("nearest to singular: time / s", f"{nearest['time']:g}")
         whole.add_row("... smallest singular value", _g(nearest["sigma_min"]))
         whole.add_row("... condition number", _g(nearest["condition"]))
+    if limits := facts["limits"]:
+        least = limits["least"]
+        whole.add_row("least slack: limit", escape(least["limit"]) if least else "none")
+        if least:
+            whole.add_row("... slack", readable(least["margin"], least["unit"]))
+            whole.add_row("... relative to the limit's scale", _g(least["relative"]))
+            whole.add_row("... time / s", f"{least['time']:g}")
     out.print(whole)
+    if limits and limits["passed"]:
+        passed = _table("Limits that are passed", "limit", "states>", "first at / s>", "furthest>", "at / s>")
+        for row in limits["passed"]:
+            passed.add_row(
+                escape(row["limit"]),
+                str(row["states"]),
+                f"{row['first_time']:g}",
+                readable(-row["margin"], row["unit"]),
+                f"{row['time']:g}",
+            )
+        out.print(passed)
     if coupled:
         out.print(f"Note: {coupled['note']}.")
 
@@ -343,8 +384,12 @@ def _print_solution(out: Console, facts: dict[str, Any]) -> None:
                 row["status"], str(row["count"]), f"{row['first_time']:g}", escape(row["message"])
             )
         out.print(outcomes)
+    elif not limits:
+        out.print("All states have an answer; the mechanism file sets no limits.")
+    elif limits["passed"]:
+        out.print("All states have an answer, but some are beyond a limit.")
     else:
-        out.print("All states have an answer, inside the strokes.")
+        out.print("All states have an answer, within all limits.")
 
 
 # --- printing -----------------------------------------------------------------------------------------------

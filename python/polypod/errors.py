@@ -58,6 +58,10 @@ class CoordinateError(PolypodError):
     """Coordinates that make up no coordinate set of the mechanism."""
 
 
+class UnsupportedError(PolypodError):
+    """A question that has no answer for this kind of mechanism."""
+
+
 class ShapeError(PolypodError):
     """An array whose shape does not fit."""
 

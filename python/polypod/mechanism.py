@@ -17,22 +17,35 @@ from numpy.typing import ArrayLike, NDArray
 from polypod import _core
 from polypod.answers import (
     Array,
+    AssemblyModes,
     Codes,
     Conditioning,
     CoupledForces,
+    ForwardKinematics,
     GraphJoint,
     GraphLink,
     InverseDynamics,
     InverseKinematics,
     Kinematics,
+    Limit,
+    Limits,
     Mobility,
     Power,
     Published,
     State,
 )
-from polypod.errors import CoordinateError, Fault, MechanismError, ShapeError, UnknownNameError, alternatives
+from polypod.errors import (
+    CoordinateError,
+    Fault,
+    MechanismError,
+    ShapeError,
+    UnknownNameError,
+    UnsupportedError,
+    alternatives,
+)
 from polypod.schema import read_spec
 from polypod.status import Status
+from polypod.units import readable
 
 NEAR_SINGULAR = 0.01
 """Smallest singular value (a pure number) below which a pose is called nearly singular."""
@@ -181,15 +194,11 @@ class Mechanism:
                 "The platform can move there with hardly any change of the leg lengths, and forces are "
                 "large; stay clear of it."
             )
-        lengths = self.inverse_kinematics(self.home).lengths
-        for name, length, (least, greatest) in zip(self.leg_names, lengths, self.stroke, strict=True):
-            if not least <= length <= greatest:
-                notes.append(
-                    f"leg {name} is {1e3 * length:.1f} mm long at the centre pose, outside its stroke of "
-                    f"{1e3 * least:.1f} to {1e3 * greatest:.1f} mm."
-                )
-        if self.inverse_kinematics(self.home).status == Status.OUT_OF_CONE:
-            notes.append("a joint is beyond its cone limit at the centre pose.")
+        notes += [
+            f"beyond a limit at its centre pose: {limit.name}, by {readable(-margin, limit.unit)}."
+            for limit, margin in zip(self.limit_list, self.limits(self.home).margins, strict=True)
+            if margin < 0.0
+        ]
         if mobility.redundant:
             several = mobility.redundant > 1
             notes.append(
@@ -391,6 +400,73 @@ class Mechanism:
         shape, (poses,) = self._batch(pose=(pose, (4, 4)))
         return Conditioning(**_shaped(self._core.conditioning(poses), shape))
 
+    # --- forward kinematics ------------------------------------------------------------------------------
+
+    def forward_kinematics(
+        self, lengths: ArrayLike, guess: ArrayLike | None = None, *, continued: bool = False
+    ) -> ForwardKinematics:
+        """The pose with the given leg lengths, in the assembly mode of the guess [T25-T27].
+
+        Args:
+            lengths: (..., n), m; those of passive legs are not read.
+            guess: pose or poses (..., 4, 4) in the mode that is meant; home by default.
+            continued: start each state from the one before, in the order of the flattened batch, as along a
+                motion; the guess then serves the first.
+
+        The status is MODE_JUMP where the guess's mode ends on the way to these lengths, so that the pose is one
+        of another mode; NOT_CONVERGED where no pose was found, and SINGULAR where two modes meet, so that the
+        pose is known to about 1e-7 only. Lengths that are negative or not finite give INVALID_INPUT.
+
+        >>> import polypod as pp
+        >>> mech = pp.load("lu-3spu-2rpu-r")
+        >>> pose = mech.pose({"alpha": 0.1, "p": -0.3, "h": 0.6, "beta": 0.8, "gamma": 0.6})
+        >>> guess = mech.pose({"alpha": 0.1, "p": -0.28, "h": 0.6, "beta": 0.75, "gamma": 0.6})
+        >>> found = mech.forward_kinematics(mech.inverse_kinematics(pose).lengths, guess)
+        >>> bool(abs(found.pose - pose).max() < 1e-12)
+        True
+        """
+        arguments: dict[str, tuple[ArrayLike, tuple[int, ...]]] = {"lengths": (lengths, (self.n_legs,))}
+        if guess is not None:
+            arguments["guess"] = (guess, (4, 4))
+        shape, arrays = self._batch(**arguments)
+        table = self._core.forward_kinematics(arrays[0], arrays[1] if guess is not None else None, continued)
+        return ForwardKinematics(**_shaped(table, shape))
+
+    def assembly_modes(self, lengths: ArrayLike) -> AssemblyModes:
+        """All real poses with the given leg lengths [T28, T29].
+
+        Args:
+            lengths: (..., n), m; those of passive legs are not read.
+
+        The first call for a mechanism finds all complex solutions for generic lengths; it takes about a second.
+
+        Raises:
+            UnsupportedError: not as many actuated legs as freedoms, or singular by design.
+
+        >>> import polypod as pp
+        >>> mech = pp.load("lu-3spu-2rpu-r")
+        >>> modes = mech.assembly_modes([0.769, 0.850, 0.769, 0.650, 0.650])
+        >>> int(modes.count), pp.Status(int(modes.status)).name
+        (8, 'OK')
+        """
+        shape, (flat,) = self._batch(lengths=(lengths, (self.n_legs,)))
+        found = self._core.assembly_modes(flat)
+        if found is None:
+            raise UnsupportedError(
+                f"{self.name}: assembly modes need as many actuated legs as freedoms and a design that is "
+                "not singular everywhere; forward_kinematics finds a pose near a guess"
+            )
+        table, counts, status = found
+        count = np.array(counts, dtype=np.int64)
+        present = np.arange(count.max(initial=0)) < count[:, None]
+        padded = {}
+        for name, column in table.items():
+            empty = Status.INVALID_INPUT if name == "status" else np.nan
+            padded[name] = np.full(present.shape + column.shape[1:], empty, dtype=column.dtype)
+            padded[name][present] = column
+        padded["mode_status"] = padded.pop("status")
+        return AssemblyModes(**_shaped({**padded, "count": count, "status": status}, shape))
+
     # --- dynamics ----------------------------------------------------------------------------------------
 
     def inverse_dynamics(
@@ -430,6 +506,58 @@ class Mechanism:
         """Energies and every power of their balance [T17]. Arguments as for `inverse_dynamics`."""
         shape, args = self._loaded_states(pose, twist, acceleration, wrench, wrench_axes)
         return Power(**_shaped(self._core.power(*args), shape))
+
+    # --- limits ------------------------------------------------------------------------------------------
+
+    @property
+    def limit_list(self) -> tuple[Limit, ...]:
+        """All limits that the file sets: joints, then clearances, conditioning, forces [T35]."""
+        return tuple(
+            Limit(name, kind, tuple(self.leg_names[i] for i in legs), unit, least, greatest, scale)
+            for name, kind, legs, unit, least, greatest, scale in self._core.limit_list()
+        )
+
+    def limits(
+        self,
+        pose: ArrayLike,
+        wrench: ArrayLike | None = None,
+        wrench_axes: str = "base",
+        *,
+        twist: ArrayLike | None = None,
+        acceleration: ArrayLike | None = None,
+    ) -> Limits:
+        """How far a pose is from every limit, and which binds [T35-T38].
+
+        Forces are those that hold the load at rest, or those of the motion where one is given. At a singular
+        pose (status SINGULAR) the margins of forces are NaN and the others stand.
+
+        Args:
+            pose: (..., 4, 4).
+            wrench: load on the platform at o, (..., 6), N and N m; the mechanism's own by default. Only the
+                limits of forces depend on it.
+            wrench_axes: the axes of `wrench`, "base" or "platform".
+            twist: (..., 6); rest by default.
+            acceleration: (..., 6); zero by default.
+
+        >>> import polypod as pp
+        >>> mech = pp.load("lu-3spu-2rpu-r")
+        >>> limits = mech.limits(mech.home)
+        >>> limits.names[limits.binding], limits.margins.min().round(4), bool(limits.within)
+        ('stroke min of leg 2', np.float64(0.0941), True)
+        """
+        rest = np.zeros(6)
+        twist, acceleration = (rest if a is None else a for a in (twist, acceleration))
+        shape, args = self._loaded_states(pose, twist, acceleration, wrench, wrench_axes)
+        out = _shaped(self._core.limits(*args), shape)
+        margins, binding, status = out["margins"], out["binding"], out["status"]
+        return Limits(
+            tuple(limit.name for limit in self.limit_list),
+            margins,
+            out["relative"],
+            np.where(np.isnan(binding), -1, binding).astype(np.int64),
+            (margins >= 0.0).all(axis=-1) & np.isin(status, [s for s in Status if s.has_answer]),
+            status,
+        )
 
     def coupled_forces(
         self, pose: ArrayLike, constraint: ArrayLike, *, as_printed: bool = False

@@ -137,6 +137,13 @@ class Link(Table):
     inertia: Inertia
 
 
+class Range(Table):
+    """Least and greatest value: turn of an R joint or of a rod since home, active force of a leg."""
+
+    min: Number
+    max: Number
+
+
 class Rod(Table):
     """Rod axes are (L, n, L x n); `center` counts from `point`."""
 
@@ -146,6 +153,7 @@ class Rod(Table):
     mass: Number | None = None
     center: Vector | None = None
     inertia: Inertia | None = None
+    range: Range | None = None
 
 
 class Stroke(Table):
@@ -171,6 +179,7 @@ class Joint(Table):
     normal: Axis | None = None
     rod: str | None = None
     cone: Cone | None = None
+    range: Range | None = None
 
 
 class Leg(Table):
@@ -180,18 +189,28 @@ class Leg(Table):
     actuated: Annotated[bool, Strict()] = True
     stroke: Stroke | None = None
     radius: Number | None = None
+    force: Range | None = None
     base: Joint
     platform: Joint
     cylinder: Link | None = None
     piston: Link | None = None
 
 
-SECTIONS = ("units", "dynamics", "load", "home", "tool", "published", "platform", "rods", "legs")
+class Limits(Table):
+    """Limits of the mechanism as a whole."""
+
+    sigma_min: Number | None = None
+    clearance: Number | None = None
+    joint_reach: Number | None = None
+
+
+SECTIONS = ("units", "dynamics", "load", "home", "tool", "limits", "published", "platform", "rods", "legs")
 
 # Which kind of quantity stands under a key, wherever in the file.
 KIND_OF_KEY = {
     **dict.fromkeys(("point", "radius", "position", "center", "stroke"), "length"),
-    **dict.fromkeys(("angle", "rotation_vector"), "angle"),
+    **dict.fromkeys(("clearance", "joint_reach"), "length"),
+    **dict.fromkeys(("angle", "rotation_vector", "range"), "angle"),
     **{kind: kind for kind in ("mass", "inertia", "force", "torque")},
     "gravity": "acceleration",
 }
@@ -215,6 +234,7 @@ def read_spec(data: dict[str, Any]) -> tuple[dict[str, Any], list[Fault]]:
     dynamics = read_table(Dynamics, data.get("dynamics", {}), "dynamics", faults) or Dynamics()
     load = read_table(Load, data.get("load", {}), "load", faults) or Load()
     tool = read_table(Tool, data.get("tool", {}), "tool", faults) or Tool()
+    limits = read_table(Limits, data.get("limits", {}), "limits", faults) or Limits()
     home = read_table(Home, data["home"], "home", faults) if "home" in data else None
     if "home" not in data:
         faults.append(Fault("home", "is missing; needs the centre pose, such as position = [0, 0, 700]"))
@@ -247,6 +267,11 @@ def read_spec(data: dict[str, Any]) -> tuple[dict[str, Any], list[Fault]]:
             "rotation_vector": units.vector(home.rotation_vector, "angle"),
         },
         "tool": {"point": _point(tool.point, units), "axis": _axis(tool.axis, units)},
+        "limits": {
+            "sigma_min": limits.sigma_min,
+            "clearance": None if limits.clearance is None else units.si(limits.clearance, "length"),
+            "joint_reach": None if limits.joint_reach is None else units.si(limits.joint_reach, "length"),
+        },
     }
     return spec, faults
 
@@ -287,6 +312,7 @@ def _rod(data: object, place: str, units: Units, faults: list[Fault]) -> dict[st
         "point": _point(rod.point, units),
         "axis": _axis(rod.axis, units),
         "body": body,
+        "range": _range(rod.range, "angle", units),
     }
 
 
@@ -306,6 +332,7 @@ def _leg(
         "actuated": leg.actuated,
         "stroke": leg.stroke and units.vector((leg.stroke.min, leg.stroke.max), "length"),
         "radius": None if leg.radius is None else units.si(leg.radius, "length"),
+        "force": _range(leg.force, "force", units),
         "base": base,
         "platform": platform,
         "cylinder": leg.cylinder and _link(leg.cylinder, +1, units),
@@ -345,7 +372,12 @@ def _joint(
             "angle": units.si(joint.cone.angle, "angle"),
             "axis": None if joint.cone.axis is None else _axis(joint.cone.axis, units),
         },
+        "range": _range(joint.range, "angle", units),
     }
+
+
+def _range(given: Range | None, kind: str, units: Units) -> list[float] | None:
+    return None if given is None else units.vector((given.min, given.max), kind)
 
 
 def _link(link: Link, sign: int, units: Units) -> dict[str, Any]:
@@ -387,6 +419,8 @@ _TABLE_OF_KEY: dict[str, type[Table]] = {
     "normal": PolarAxis,
     "stroke": Stroke,
     "cone": Cone,
+    "range": Range,
+    "force": Range,
     "base": Joint,
     "platform": Joint,
     "cylinder": Link,

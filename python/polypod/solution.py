@@ -24,6 +24,7 @@ Array = NDArray[np.float64]
 
 _TIME, _LEG, _ROD = ("time",), ("time", "leg"), ("time", "rod")
 _LEG3, _ROD3, _SIX = ("time", "leg", "axis"), ("time", "rod", "axis"), ("time", "component")
+_LIMIT = ("time", "limit")
 _PAIR = ("time", "leg", "joint_axis")
 
 # name → dimensions, unit, symbol, long name
@@ -74,6 +75,9 @@ VARIABLES: dict[str, tuple[tuple[str, ...], str, str, str]] = {
     "actuator_work": (_TIME, "J", "", "work of the actuators since the start"),
     "sigma_min": (_TIME, "1", "σ_min", "smallest singular value of the leg Jacobian"),
     "condition": (_TIME, "1", "", "condition number of the leg Jacobian"),
+    "limit_margin": (_LIMIT, "m, rad, 1 or N", "", "slack of the limit, negative beyond it"),
+    "limit_relative": (_LIMIT, "1", "", "slack of the limit relative to its scale"),
+    "binding_limit": (_TIME, "1", "", "index of the limit with the least relative slack; -1 for none"),
 }
 _LENGTHS = {"x", "y", "z", "p", "h", "tip_x", "tip_y", "tip_z"}
 _PURE = {"axis_x", "axis_y", "axis_z"}
@@ -136,6 +140,7 @@ def _solve_chunk(mech: Mechanism, motion: Motion, state: State, chunk: slice) ->
     dynamics = mech.inverse_dynamics(pose, twist, acceleration, *load)
     power = mech.power(pose, twist, acceleration, *load)
     conditioning = mech.conditioning(pose)
+    limits = mech.limits(pose, *load, twist=twist, acceleration=acceleration)
     # The first thing that went wrong explains the rest.
     found = state.status[chunk]
     status = np.where(found != Status.OK, found, dynamics.status)
@@ -178,6 +183,9 @@ def _solve_chunk(mech: Mechanism, motion: Motion, state: State, chunk: slice) ->
         "condition": conditioning.condition,
         "status": status.astype(np.int8),
     }
+    if limits.names:
+        values["limit_margin"], values["limit_relative"] = limits.margins, limits.relative
+        values["binding_limit"] = limits.binding.astype(np.int32)
     for suffix, as_printed in (("", False), ("_as_printed", True)) if mech.coupled_legs else ():
         coupled = mech.coupled_forces(pose, dynamics.constraint, as_printed=as_printed)
         values[f"coupled_force{suffix}"] = coupled.forces
@@ -215,6 +223,8 @@ def _dataset(mech: Mechanism, motion: Motion, values: dict[str, NDArray[Any]]) -
         "column": [0, 1, 2, 3],
         "rod": list(mech.rod_names),
         "constraint_row": [f"{kind} of leg {leg}" for leg, kind in rows],
+        "limit": [limit.name for limit in mech.limit_list],
+        "limit_unit": ("limit", [limit.unit for limit in mech.limit_list]),
     }
     if mech.coupled_legs:
         coords["coupled_leg"] = list(mech.coupled_legs)

@@ -24,11 +24,19 @@ class Status(IntEnum):
     INVALID_INPUT = 7
     BRANCH_JUMP = 8
     OUT_OF_CONE = 9
+    MODE_JUMP = 10
+    OUT_OF_ANGLE = 11
 
     @property
     def has_answer(self) -> bool:
         """Whether the numbers of such a state stand."""
-        return self in (Status.OK, Status.OUT_OF_STROKE, Status.OUT_OF_CONE)
+        return self in (
+            Status.OK,
+            Status.OUT_OF_STROKE,
+            Status.OUT_OF_CONE,
+            Status.OUT_OF_ANGLE,
+            Status.MODE_JUMP,
+        )
 
     @property
     def message(self) -> str:

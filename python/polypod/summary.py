@@ -92,8 +92,27 @@ def describe(mech: Mechanism) -> dict[str, Any]:
             "sigma_max": _number(centre.sigma_max),
             "condition": _number(centre.condition),
         },
+        "limits": _limits_at_home(mech),
         "warnings": mech.warnings,
     }
+
+
+def _limits_at_home(mech: Mechanism) -> list[dict[str, Any]]:
+    """Every limit with its margin at the centre pose, and which binds there."""
+    home = mech.limits(mech.home)
+    return [
+        {
+            "name": limit.name,
+            "kind": limit.kind,
+            "legs": limit.legs,
+            "unit": limit.unit,
+            "allowed": [_number(limit.least), _number(limit.greatest)],
+            "margin": _number(home.margins[i]),
+            "relative": _number(home.relative[i]),
+            "binds": bool(i == home.binding),
+        }
+        for i, limit in enumerate(mech.limit_list)
+    ]
 
 
 def accounting(mobility: Mobility) -> dict[str, Any]:
@@ -177,6 +196,39 @@ def summarise(mech: Mechanism, solution: Solution) -> dict[str, Any]:
         },
         "power": _power(solution),
         "coupled": _coupled(solution),
+        "limits": _limits(solution),
+    }
+
+
+def _limits(solution: Solution) -> dict[str, Any] | None:
+    """The least slack along the motion, with its limit and time, and every limit that is passed."""
+    data = solution.dataset
+    if "limit_margin" not in data:
+        return None
+    time, names = data["time"].to_numpy(), data["limit"].to_numpy().tolist()
+    units = data["limit_unit"].to_numpy().tolist()
+    margins, relative = data["limit_margin"].to_numpy(), data["limit_relative"].to_numpy()
+
+    def slack(state: int, limit: int) -> dict[str, Any]:
+        return {
+            "limit": names[limit],
+            "time": float(time[state]),
+            "margin": float(margins[state, limit]),
+            "relative": float(relative[state, limit]),
+            "unit": units[limit],
+        }
+
+    passed = []
+    for i in np.flatnonzero((margins < 0.0).any(axis=0)):
+        beyond = np.flatnonzero(margins[:, i] < 0.0)
+        worst = slack(int(np.nanargmin(margins[:, i])), int(i))
+        passed.append({**worst, "states": len(beyond), "first_time": float(time[beyond[0]])})
+    known = np.isfinite(relative).any()
+    least = np.unravel_index(np.nanargmin(relative), relative.shape) if known else None
+    return {
+        "least": None if least is None else slack(int(least[0]), int(least[1])),
+        "passed": passed,
+        "not_determined": int(np.isnan(margins).any(axis=1).sum()),
     }
 
 

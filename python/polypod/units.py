@@ -50,6 +50,12 @@ def from_si(value: Value, kind: str, unit: str) -> Value:
     return value * d / n
 
 
+def readable(value: float, unit: str) -> str:
+    """A number in m, rad, N or 1 as people read it: in mm, deg, N or as it is."""
+    factor, name = {"m": (1e3, " mm"), "rad": (180 / math.pi, " deg"), "N": (1.0, " N")}.get(unit, (1.0, ""))
+    return f"{factor * value:.1f}{name}" if name else f"{value:.3g}"
+
+
 def cos_sin(angle: float, unit: str) -> tuple[float, float]:
     """Cosine and sine; from degrees exact at multiples of 90 and exactly symmetric about them."""
     if unit != "deg":

@@ -5,6 +5,7 @@ use std::cmp::Ordering;
 
 use crate::constraint;
 use crate::leg;
+use crate::limits;
 use crate::mechanism::{
     Body, Constraint, ConstraintKind, Joint, Leg, Load, Mechanism, Mobility, Rod, Side, Turning,
 };
@@ -39,6 +40,7 @@ pub fn assemble(spec: &Spec) -> Result<Mechanism, Vec<Fault>> {
         let (independent, mobility) = mobility::analyse(&mech);
         mech.independent = independent;
         mech.mobility = mobility;
+        mech.limits = limits::of(&mech, spec);
         faults.extend(check_freedoms(&mech));
     }
     faults.extend(off_home);
@@ -79,6 +81,7 @@ fn build(spec: &Spec, home: Pose<f64>) -> Mechanism {
         independent: Vec::new(),
         characteristic_length,
         mobility: Mobility::default(),
+        limits: Vec::new(),
     }
 }
 
@@ -300,7 +303,6 @@ fn make_leg(spec: &LegSpec, rods: &[Rod], home: &Pose<f64>) -> Leg {
     Leg {
         name: spec.name.clone(),
         actuated: spec.actuated,
-        stroke: spec.stroke.unwrap_or([0.0, f64::INFINITY]),
         radius: spec.radius,
         base,
         platform,
@@ -318,7 +320,6 @@ fn make_joint(spec: &JointSpec, direction: Vec3<f64>) -> Joint {
         point: spec.point,
         axis: spec.axis.map(Vec3::unit),
         normal: spec.normal.map(Vec3::unit),
-        cone_limit: spec.cone.as_ref().map(|c| c.angle),
         cone_axis,
     }
 }

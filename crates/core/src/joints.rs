@@ -3,8 +3,9 @@
 //! At the base they are those of the leg against the base, at the platform those of the platform against the leg, so
 //! that `ω = ω_leg + φ_1' u + φ_2' n` [Eq. 29].
 
-use crate::leg::{self, Frame, State};
-use crate::mechanism::{Joint, Leg, Mechanism};
+use crate::leg::{self, State};
+use crate::mechanism::{Joint, Leg, Mechanism, Side};
+use crate::real::Trig;
 use crate::spatial::{Mat3, Motion, Pose, Vec3};
 use crate::spec::JointKind;
 
@@ -37,59 +38,89 @@ impl Zero {
 /// Base joint and platform joint of a leg.
 #[must_use]
 pub fn angles(leg: &Leg, zero: &Zero, platform: &Motion<f64>, state: &State<f64>) -> [JointAngles; 2] {
-    let relative = state.turn.omega - platform.twist.omega;
-    let base = one(&leg.base, zero.base, &Mat3::identity(), state, state.turn.omega);
-    let mut above = one(&leg.platform, zero.platform, &platform.pose.rotation, state, relative);
+    let (n, delta, omega) = (state.frame.n(), state.position.delta, state.turn.omega);
+    let rotation = &platform.pose.rotation;
+    let at = |side, joint: &Joint, body: &Mat3<f64>, omega: Vec3<f64>| JointAngles {
+        angles: angles_at(leg, side, zero, rotation, n, delta),
+        rates: rates(joint, body, n, omega),
+        cone: cone_angle(joint, body.transpose_mul(delta)),
+    };
     // Seen from the leg the platform turns the other way.
-    above.angles = above.angles.map(|a| -a);
-    above.rates = above.rates.map(|a| -a);
-    [base, above]
+    [
+        at(Side::Base, &leg.base, &Mat3::identity(), omega),
+        at(Side::Platform, &leg.platform, rotation, platform.twist.omega - omega),
+    ]
 }
 
-/// The leg against a body with the given axes, turning at `omega` relative to it.
-fn one(
-    joint: &Joint,
-    (n0, delta0): (Vec3<f64>, Vec3<f64>),
-    body: &Mat3<f64>,
-    state: &State<f64>,
-    omega: Vec3<f64>,
-) -> JointAngles {
-    let (n, delta) = (body.transpose_mul(state.frame.n()), body.transpose_mul(state.position.delta));
-    let omega = body.transpose_mul(omega);
-    let mut result =
-        JointAngles { angles: [f64::NAN; 2], rates: [f64::NAN; 2], cone: cone_angle(joint, delta) };
-    match (joint.kind, joint.axis) {
+/// Angles of one joint of a leg with the normal `n` and the direction `delta`, given in base axes; `rotation` is
+/// the platform's. NaN where the joint has none.
+pub fn angles_at<T: Trig>(
+    leg: &Leg,
+    side: Side,
+    zero: &Zero,
+    rotation: &Mat3<T>,
+    n: Vec3<T>,
+    delta: Vec3<T>,
+) -> [T; 2] {
+    let (joint, (n0, delta0), n, delta) = match side {
+        Side::Base => (&leg.base, zero.base, n, delta),
+        Side::Platform => {
+            (&leg.platform, zero.platform, rotation.transpose_mul(n), rotation.transpose_mul(delta))
+        }
+    };
+    let none = T::lit(f64::NAN);
+    let angles = match (joint.kind, joint.axis) {
         (JointKind::Universal, Some(u)) => {
-            let swing = |delta: Vec3<f64>, n: Vec3<f64>| delta.dot(n.cross(u)).atan2(delta.dot(u));
-            result.angles = [about(u, n0, n), wrapped(swing(delta, n) - swing(delta0, n0))];
-            result.rates = [omega.dot(u), omega.dot(n)];
+            [about(u, n0, n), wrapped(swing(u, delta, n) - T::lit(swing(u, delta0, n0)))]
         }
-        (JointKind::Revolute, Some(u)) => {
-            result.angles[0] = about(u, delta0, delta);
-            result.rates[0] = omega.dot(u);
-        }
-        _ => {}
+        (JointKind::Revolute, Some(u)) => [about(u, delta0, delta), none],
+        _ => [none, none],
+    };
+    match side {
+        Side::Base => angles,
+        // Seen from the leg the platform turns the other way.
+        Side::Platform => angles.map(|a| -a),
     }
-    result
+}
+
+/// Rates of the angles of a joint whose outer link turns at `omega` against the inner one; `body` are the axes that
+/// the joint's own axis is given in.
+fn rates(joint: &Joint, body: &Mat3<f64>, n: Vec3<f64>, omega: Vec3<f64>) -> [f64; 2] {
+    match (joint.kind, joint.axis) {
+        (JointKind::Universal, Some(u)) => [omega.dot(*body * u), omega.dot(n)],
+        (JointKind::Revolute, Some(u)) => [omega.dot(*body * u), f64::NAN],
+        _ => [f64::NAN; 2],
+    }
 }
 
 /// The angle between the joint's cone axis and the leg's direction, both in the axes of the body.
 #[must_use]
-pub fn cone_angle(joint: &Joint, delta: Vec3<f64>) -> f64 {
-    joint.cone_axis.cross(delta).norm().atan2(joint.cone_axis.dot(delta))
+pub fn cone_angle<T: Trig>(joint: &Joint, delta: Vec3<T>) -> T {
+    let axis = Vec3::lift(joint.cone_axis);
+    axis.cross(delta).norm().atan2(axis.dot(delta))
 }
 
 /// The turn about `axis` that takes `from` to `to`.
-fn about(axis: Vec3<f64>, from: Vec3<f64>, to: Vec3<f64>) -> f64 {
-    to.dot(axis.cross(from)).atan2(to.dot(from) - axis.dot(to) * axis.dot(from))
+fn about<T: Trig>(axis: Vec3<f64>, from: Vec3<f64>, to: Vec3<T>) -> T {
+    let side = Vec3::lift(axis.cross(from));
+    let along = to.dot(Vec3::lift(from)) - Vec3::lift(axis).dot(to) * T::lit(axis.dot(from));
+    to.dot(side).atan2(along)
 }
 
-fn wrapped(angle: f64) -> f64 {
-    angle.sin().atan2(angle.cos())
+/// The angle of a leg about its normal, from the axis of its universal joint.
+fn swing<T: Trig>(axis: Vec3<f64>, delta: Vec3<T>, n: Vec3<T>) -> T {
+    let axis = Vec3::lift(axis);
+    delta.dot(n.cross(axis)).atan2(delta.dot(axis))
 }
 
-/// The turn of each rod about its line since the home pose.
+/// The angle of the same direction within a half turn of zero.
+pub(crate) fn wrapped<T: Trig>(angle: T) -> T {
+    let (s, c) = angle.sin_cos();
+    s.atan2(c)
+}
+
+/// The turn of each rod about its line since the home pose; `n` is the normal of the leg that leads it.
 #[must_use]
-pub fn rod_angle(mech: &Mechanism, rod: usize, zero: &Zero, frame: &Frame<f64>) -> f64 {
-    about(mech.rods[rod].axis, zero.base.0, frame.n())
+pub fn rod_angle<T: Trig>(mech: &Mechanism, rod: usize, zero: &Zero, n: Vec3<T>) -> T {
+    about(mech.rods[rod].axis, zero.base.0, n)
 }

@@ -5,6 +5,7 @@
 
 pub mod assembly;
 pub mod batch;
+pub mod clearance;
 pub mod constraint;
 pub mod coordinates;
 pub mod dynamics;
@@ -12,6 +13,7 @@ pub mod forward;
 pub mod jacobian;
 pub mod joints;
 pub mod leg;
+pub mod limits;
 pub mod linear;
 pub mod mechanism;
 pub mod mobility;

@@ -6,6 +6,7 @@
 
 use serde::Serialize;
 
+use crate::limits::Limit;
 use crate::spatial::{Mat3, Pose, Vec3, Wrench};
 use crate::spec::{Axes, JointKind};
 
@@ -44,8 +45,6 @@ pub struct Joint {
     pub axis: Option<Vec3<f64>>,
     /// F: the leg's n.
     pub normal: Option<Vec3<f64>>,
-    /// Largest cone angle, rad.
-    pub cone_limit: Option<f64>,
     /// Unit axis from which the cone angle is measured, in the axes of the body.
     pub cone_axis: Vec3<f64>,
 }
@@ -54,7 +53,7 @@ pub struct Joint {
 pub struct Leg {
     pub name: String,
     pub actuated: bool,
-    pub stroke: [f64; 2],
+    /// Of the strut, m.
     pub radius: Option<f64>,
     pub base: Joint,
     pub platform: Joint,
@@ -205,6 +204,8 @@ pub struct Mechanism {
     /// Root mean square distance of the platform joints from o: what lengths are scaled by, m.
     pub characteristic_length: f64,
     pub mobility: Mobility,
+    /// What the file allows: joints first, then clearances, conditioning, forces \[T35\].
+    pub limits: Vec<Limit>,
 }
 
 /// The largest number of independent constraints: one freedom at least must remain.

@@ -336,6 +336,23 @@ impl<T: Trig> Trig for Jet<T> {
     }
 }
 
+/// Complex numbers, for polynomial equations only: there is no order, so `value` is a measure of size (the 1-norm), by which
+/// pivots are chosen.
+impl Real for nalgebra::Complex<f64> {
+    #[inline(always)]
+    fn lit(x: f64) -> Self {
+        nalgebra::Complex::new(x, 0.0)
+    }
+    #[inline(always)]
+    fn value(self) -> f64 {
+        self.re.abs() + self.im.abs()
+    }
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        nalgebra::Complex::sqrt(self)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -372,22 +389,5 @@ mod tests {
         let inside = Jet::new(t, 1.0, 0.0);
         let direct = sample(inside * inside);
         assert!((composed.d - direct.d).abs() < 1e-14 && (composed.dd - direct.dd).abs() < 1e-13);
-    }
-}
-
-/// Complex numbers, for polynomial equations only: there is no order, so `value` is a measure of size (the 1-norm), by which
-/// pivots are chosen.
-impl Real for nalgebra::Complex<f64> {
-    #[inline(always)]
-    fn lit(x: f64) -> Self {
-        nalgebra::Complex::new(x, 0.0)
-    }
-    #[inline(always)]
-    fn value(self) -> f64 {
-        self.re.abs() + self.im.abs()
-    }
-    #[inline(always)]
-    fn sqrt(self) -> Self {
-        nalgebra::Complex::sqrt(self)
     }
 }

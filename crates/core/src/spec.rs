@@ -2,6 +2,8 @@
 //! The checks here find every fault that one part shows by itself; what parts must be to each other is
 //! checked where they are put together, in [`assemble`](crate::assembly::assemble).
 
+use std::f64::consts::TAU;
+
 use serde::Deserialize;
 
 use crate::spatial::{Mat3, Vec3};
@@ -70,6 +72,8 @@ pub struct JointSpec {
     pub normal: Option<Vec3<f64>>,
     pub rod: Option<usize>,
     pub cone: Option<ConeSpec>,
+    /// R: least and greatest turn since home, rad.
+    pub range: Option<[f64; 2]>,
 }
 
 #[derive(Clone, Debug, Deserialize)]
@@ -88,6 +92,8 @@ pub struct LegSpec {
     pub actuated: bool,
     pub stroke: Option<[f64; 2]>,
     pub radius: Option<f64>,
+    /// Least and greatest active force, N.
+    pub force: Option<[f64; 2]>,
     pub base: JointSpec,
     pub platform: JointSpec,
     pub cylinder: Option<BodySpec>,
@@ -101,6 +107,8 @@ pub struct RodSpec {
     pub point: Vec3<f64>,
     pub axis: Vec3<f64>,
     pub body: Option<BodySpec>,
+    /// Least and greatest turn about its line since home, rad.
+    pub range: Option<[f64; 2]>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
@@ -132,6 +140,18 @@ pub struct ToolSpec {
     pub axis: Vec3<f64>,
 }
 
+/// Limits of the mechanism as a whole.
+#[derive(Clone, Copy, Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LimitsSpec {
+    /// Floor for the smallest singular value, a pure number.
+    pub sigma_min: Option<f64>,
+    /// Least distance between the surfaces of struts, and between strut and platform, m.
+    pub clearance: Option<f64>,
+    /// How much of a strut at its joint does not count for clearances, m.
+    pub joint_reach: Option<f64>,
+}
+
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Spec {
@@ -148,6 +168,8 @@ pub struct Spec {
     pub load: LoadSpec,
     pub home: Option<HomeSpec>,
     pub tool: ToolSpec,
+    #[serde(default)]
+    pub limits: LimitsSpec,
 }
 
 impl Spec {
@@ -178,10 +200,12 @@ impl Spec {
         faults.body("platform", self.platform.as_ref());
         for (place, rod) in numbered("rods", &self.rods) {
             faults.body(&place, rod.body.as_ref());
+            faults.range(&place, rod.range.filter(|_| self.angles_known));
         }
         for (place, leg) in numbered("legs", &self.legs) {
             faults.leg(&place, leg, self.angles_known);
         }
+        faults.limits(self);
         faults.same_names(numbered("legs", &self.legs).map(|(place, leg)| (place, leg.name.as_str())));
         faults.same_names(numbered("rods", &self.rods).map(|(place, rod)| (place, rod.name.as_str())));
         faults.0
@@ -250,6 +274,14 @@ impl Faults {
                 let message = format!("is {} rad; must be above 0 and at most pi", cone.angle);
                 self.add(format!("{place}.{side}.cone.angle"), message);
             }
+            if joint.range.is_some() && joint.joint != JointKind::Revolute {
+                let message = format!(
+                    "must not be given; only R joints have a range, this is {}",
+                    joint.joint.letter()
+                );
+                self.add(format!("{place}.{side}.range"), message);
+            }
+            self.range(&format!("{place}.{side}"), joint.range.filter(|_| angles_known));
         }
         if let Some([min, max]) = leg.stroke
             && !(min >= 0.0 && min < max && max.is_finite())
@@ -264,6 +296,14 @@ impl Faults {
         {
             self.add(format!("{place}.radius"), format!("is {radius} m; must be positive"));
         }
+        if let Some([min, max]) = leg.force
+            && !(min < max && min.is_finite() && max.is_finite())
+        {
+            self.add(format!("{place}.force"), format!("min is {min} N, max is {max} N; needs min < max"));
+        }
+        if leg.force.is_some() && !leg.actuated {
+            self.add(format!("{place}.force"), "must not be given; a passive leg has no active force");
+        }
         self.body(&format!("{place}.cylinder"), leg.cylinder.as_ref());
         self.body(&format!("{place}.piston"), leg.piston.as_ref());
         if leg.base.joint == JointKind::Spherical && leg.platform.joint == JointKind::Spherical {
@@ -275,6 +315,50 @@ impl Faults {
                          centre on it, inertia [[a, 0, 0], [0, b, 0], [0, 0, a]]",
                     );
                 }
+            }
+        }
+    }
+
+    /// The range of an angle. The circle has no ends: a turn of 350 degrees is one of -10.
+    fn range(&mut self, place: &str, range: Option<[f64; 2]>) {
+        if let Some([min, max]) = range
+            && !(min < max && max - min <= TAU)
+        {
+            let message =
+                format!("min is {min} rad, max is {max} rad; needs min < max, at most a full turn apart");
+            self.add(format!("{place}.range"), message);
+        }
+    }
+
+    /// Limits of the whole, and what they need of the legs.
+    fn limits(&mut self, spec: &Spec) {
+        let LimitsSpec { sigma_min, clearance, joint_reach } = spec.limits;
+        if let Some(floor) = sigma_min.filter(|&s| !(s > 0.0 && s.is_finite())) {
+            self.add("limits.sigma_min", format!("is {floor}; must be positive"));
+        }
+        if let Some(gap) = clearance.filter(|&c| !(c >= 0.0 && c.is_finite())) {
+            self.add("limits.clearance", format!("is {gap} m; must be zero or positive"));
+        }
+        if let Some(reach) = joint_reach.filter(|&r| !(r > 0.0 && r.is_finite())) {
+            self.add("limits.joint_reach", format!("is {reach} m; must be positive"));
+        }
+        if joint_reach.is_some() && clearance.is_none() {
+            self.add("limits.joint_reach", "has no effect without limits.clearance; give both or none");
+        }
+        let Some(gap) = clearance else { return };
+        for (place, leg) in numbered("legs", &spec.legs) {
+            let Some(radius) = leg.radius else {
+                self.add(format!("{place}.radius"), "is missing; limits.clearance needs it of every leg");
+                continue;
+            };
+            if let Some(reach) = joint_reach.filter(|&reach| reach <= radius + gap) {
+                let message = format!(
+                    "is {reach} m; must exceed radius and clearance of leg \"{}\", together {} m, which it \
+                     otherwise misses at its own joint in every pose",
+                    leg.name,
+                    radius + gap
+                );
+                self.add("limits.joint_reach", message);
             }
         }
     }

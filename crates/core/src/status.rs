@@ -26,10 +26,12 @@ pub enum Status {
     OutOfCone = 9,
     /// The lengths have a pose, but not in the assembly mode of the guess; the pose stands.
     ModeJump = 10,
+    /// A revolute joint or a rod turns beyond its range; the numbers stand.
+    OutOfAngle = 11,
 }
 
 impl Status {
-    pub const ALL: [Status; 11] = [
+    pub const ALL: [Status; 12] = [
         Status::Ok,
         Status::NoBranch,
         Status::Fold,
@@ -41,6 +43,7 @@ impl Status {
         Status::BranchJump,
         Status::OutOfCone,
         Status::ModeJump,
+        Status::OutOfAngle,
     ];
 
     /// What it means and what helps.
@@ -80,6 +83,9 @@ impl Status {
             Status::ModeJump => {
                 "on the way from the guess to these lengths its assembly mode ends in a singularity; the pose has the \
                  lengths but lies in another mode: give a guess in the mode that is meant, or ask for all assembly modes"
+            }
+            Status::OutOfAngle => {
+                "a revolute joint or a rod turns beyond its range; the numbers stand, the machine cannot reach the pose"
             }
             Status::InvalidInput => {
                 "the input holds NaN or infinity, or its rotation is not a rotation matrix"

@@ -3,11 +3,15 @@
 // Arguments arrive from Python by value.
 #![allow(clippy::needless_pass_by_value)]
 
+use std::sync::OnceLock;
+
 use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray1};
 use polypod_core::assembly::assemble;
 use polypod_core::batch::{self, Coordinates, Loads, States, Table};
 use polypod_core::coordinates::Set;
+use polypod_core::limits::Limit;
 use polypod_core::mechanism::Mechanism;
+use polypod_core::modes::{self, Start};
 use polypod_core::spec::{Axes, Fault, Spec};
 use polypod_core::status::Status;
 use pyo3::exceptions::{PyKeyError, PyValueError};
@@ -53,12 +57,25 @@ fn arrays(py: Python<'_>, table: Table) -> PyResult<Bound<'_, PyDict>> {
     Ok(result)
 }
 
+type LimitRow = (String, &'static str, Vec<usize>, &'static str, f64, f64, f64);
+type AllModes<'py> = (Bound<'py, PyDict>, Vec<usize>, Bound<'py, PyArray1<u8>>);
+
 type CoordinateSet = (&'static str, Vec<&'static str>, Option<Vec<bool>>);
 
 #[pyclass(name = "Mechanism", frozen)]
-struct PyMechanism(Mechanism);
+struct PyMechanism(Mechanism, OnceLock<Option<Start>>);
 
 impl PyMechanism {
+    /// One length for each leg in every row.
+    fn lengths<'a>(&self, array: &'a Array<'_>) -> PyResult<&'a [f64]> {
+        let lengths = slice(array)?;
+        if lengths.len().is_multiple_of(self.0.legs.len()) {
+            Ok(lengths)
+        } else {
+            Err(PyValueError::new_err("lengths do not have one value for each leg"))
+        }
+    }
+
     fn set(&self, name: &str) -> PyResult<Set> {
         let sets = Set::of(&self.0);
         sets.into_iter().find(|s| s.name() == name).ok_or_else(|| PyKeyError::new_err(name.to_owned()))
@@ -80,7 +97,9 @@ fn loads<'a>(wrench: Option<&'a Array<'_>>, platform_axes: bool, poses: &[f64]) 
 impl PyMechanism {
     #[new]
     fn new(spec: &str) -> PyResult<Self> {
-        assemble(&Spec::from_json(spec).map_err(raise)?).map(PyMechanism).map_err(raise)
+        assemble(&Spec::from_json(spec).map_err(raise)?)
+            .map(|mech| PyMechanism(mech, OnceLock::new()))
+            .map_err(raise)
     }
 
     #[getter]
@@ -239,6 +258,32 @@ impl PyMechanism {
         arrays(py, table)
     }
 
+    #[pyo3(signature = (poses, twists, accelerations, wrenches, platform_axes))]
+    fn limits<'py>(
+        &self,
+        py: Python<'py>,
+        poses: Array<'py>,
+        twists: Array<'py>,
+        accelerations: Array<'py>,
+        wrenches: Option<Array<'py>>,
+        platform_axes: bool,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        let states = states(&poses, &twists, &accelerations)?;
+        let loads = loads(wrenches.as_ref(), platform_axes, states.poses)?;
+        let table = py.detach(|| batch::limits(&self.0, &states, &loads));
+        arrays(py, table)
+    }
+
+    /// Name, kind, legs (from 0), unit, least and greatest value (infinite where there is none) and scale of each limit.
+    fn limit_list(&self) -> Vec<LimitRow> {
+        let mech = &self.0;
+        let row = |l: &Limit| {
+            let (least, most) = l.bound.ends();
+            (l.name.clone(), l.kind(), l.legs(mech), l.unit(), least, most, l.scale)
+        };
+        mech.limits.iter().map(row).collect()
+    }
+
     fn platform_twist<'py>(
         &self,
         py: Python<'py>,
@@ -263,6 +308,41 @@ impl PyMechanism {
         expect(accelerations, self.0.legs.len(), poses)?;
         let table = py.detach(|| batch::platform_acceleration(&self.0, poses, twists, accelerations));
         arrays(py, table)
+    }
+
+    #[pyo3(signature = (lengths, guess, continued))]
+    fn forward_kinematics<'py>(
+        &self,
+        py: Python<'py>,
+        lengths: Array<'py>,
+        guess: Option<Array<'py>>,
+        continued: bool,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        let (lengths, guess) = (self.lengths(&lengths)?, guess.as_ref().map(slice).transpose()?);
+        let count = lengths.len() / self.0.legs.len();
+        if guess.is_some_and(|g| g.len() != 16 && g.len() != 16 * count) {
+            return Err(PyValueError::new_err("needs one guess, or one for each state"));
+        }
+        let table = py.detach(|| batch::forward_kinematics(&self.0, lengths, guess, continued));
+        arrays(py, table)
+    }
+
+    /// All modes one after the other, how many belong to each set of lengths, and the status of each set; none where
+    /// legs and constraints are not six equations.
+    fn assembly_modes<'py>(&self, py: Python<'py>, lengths: Array<'py>) -> PyResult<Option<AllModes<'py>>> {
+        let lengths = self.lengths(&lengths)?;
+        let found = py.detach(|| {
+            let start = self.1.get_or_init(|| modes::start(&self.0)).as_ref();
+            start.map(|start| batch::assembly_modes(&self.0, start, lengths))
+        });
+        let Some(batch::AllModes { modes, counts, status }) = found else { return Ok(None) };
+        let status = PyArray1::from_vec(py, status.iter().map(|&s| s as u8).collect());
+        Ok(Some((arrays(py, modes)?, counts, status)))
+    }
+
+    /// The number of complex solutions for generic lengths; none where legs and constraints are not six equations.
+    fn complex_modes(&self, py: Python<'_>) -> Option<usize> {
+        py.detach(|| self.1.get_or_init(|| modes::start(&self.0)).as_ref().map(Start::solutions))
     }
 
     /// The two legs and their arrays, or none for a mechanism without a coupled pair.

@@ -1,8 +1,8 @@
 //! Whether a state is one that the mechanism can be in: the checks that every operation makes of its input.
 
 use crate::constraint;
-use crate::joints::cone_angle;
 use crate::leg;
+use crate::limits;
 use crate::mechanism::Mechanism;
 use crate::quadratic::quadratic;
 use crate::spatial::{Acceleration, Mat3, Pose, Twist, Vec3};
@@ -118,20 +118,10 @@ pub(super) fn check_finite(values: &[f64]) -> Status {
     if values.iter().all(|x| x.is_finite()) { Status::Ok } else { Status::InvalidInput }
 }
 
-/// The limit that a pose breaks, strokes before cones.
+/// The first limit of a joint that a pose breaks.
 pub(super) fn limit_status(mech: &Mechanism, pose: &Pose<f64>) -> Status {
-    let mut status = Status::Ok;
-    for leg in &mech.legs {
-        let p = leg::position(leg, pose);
-        if !(leg.stroke[0] <= p.length && p.length <= leg.stroke[1]) {
-            return Status::OutOfStroke;
-        }
-        let seen = [(&leg.base, p.delta), (&leg.platform, pose.rotation.transpose_mul(p.delta))];
-        if seen.iter().any(|(joint, delta)| joint.cone_limit.is_some_and(|a| cone_angle(joint, *delta) > a)) {
-            status = Status::OutOfCone;
-        }
-    }
-    status
+    let of_joints = mech.limits.iter().take_while(|limit| limit.status() != Status::Ok);
+    limits::status(of_joints.map(|limit| (limit, limit.margin(mech, pose, None))))
 }
 
 pub(super) fn outcome(mech: &Mechanism, solution: &[f64; 6], pivots: f64) -> Status {

@@ -69,11 +69,7 @@ pub fn states(mech: &Mechanism, input: &Coordinates, n: usize) -> Table {
             if state.status == Status::Ok {
                 (last, branch) = (state.platform.pose, state.branch);
             }
-            let (r, o) = (state.platform.pose.rotation.rows(), state.platform.pose.o.array());
-            for k in 0..3 {
-                table.set(poses, i, k, &[r[k][0], r[k][1], r[k][2], o[k]]);
-            }
-            table.set(poses, i, 3, &[0.0, 0.0, 0.0, 1.0]);
+            table.set_pose(poses, i, &state.platform.pose);
         }
         if table.status[i] == Status::Ok {
             table.set(twists, i, 0, &state.platform.twist.array());

@@ -19,7 +19,7 @@ pub enum Loads<'a> {
 }
 
 impl Loads<'_> {
-    fn at(&self, mech: &Mechanism, pose: &Pose<f64>, i: usize) -> Wrench<f64> {
+    pub(super) fn at(&self, mech: &Mechanism, pose: &Pose<f64>, i: usize) -> Wrench<f64> {
         match self {
             Loads::Own => dynamics::load_in_base(mech.load.wrench, mech.load.axes, pose),
             Loads::Given(values, axes) => {

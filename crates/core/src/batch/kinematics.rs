@@ -137,7 +137,7 @@ pub fn kinematics(mech: &Mechanism, states: &States) -> Table {
             }
             for (r, rod) in mech.rods.iter().enumerate().filter(|(_, rod)| rod.leader == k) {
                 let rod_turn = leg::rod_turn(rod.axis, &state);
-                table.set(ids[18], i, r, &[joints::rod_angle(mech, r, &zeros[k], frame)]);
+                table.set(ids[18], i, r, &[joints::rod_angle(mech, r, &zeros[k], frame.n())]);
                 table.set(ids[19], i, r, &(rod.axis * rod_turn.rate).array());
                 table.set(ids[20], i, r, &(rod.axis * rod_turn.acceleration).array());
             }

@@ -3,17 +3,22 @@
 mod checks;
 mod coordinates;
 mod dynamics;
+mod forward;
 mod kinematics;
+mod limits;
 
 pub use checks::CONSTRAINT_TOLERANCE;
 pub use coordinates::{Coordinates, coordinate_values, states};
 pub use dynamics::{Loads, coupled_forces, inverse_dynamics, power};
+pub use forward::{AllModes, assembly_modes, forward_kinematics};
 pub use kinematics::{
     conditioning, hessians, inverse_kinematics, jacobians, kinematics, platform_acceleration, platform_twist,
 };
 
+pub use limits::limits;
+
 use crate::mechanism::Mechanism;
-use crate::spatial::{Acceleration, Motion, Twist};
+use crate::spatial::{Acceleration, Motion, Pose, Twist};
 use crate::status::Status;
 use checks::{check_acceleration, check_twist, read_pose, six, then};
 
@@ -44,6 +49,15 @@ impl Table {
         });
         let table = Table { fields: fields.into(), status: vec![Status::Ok; states] };
         (table, std::array::from_fn(FieldId))
+    }
+
+    /// Writes a pose as a homogeneous matrix.
+    fn set_pose(&mut self, field: FieldId, state: usize, pose: &Pose<f64>) {
+        let (r, o) = (pose.rotation.rows(), pose.o.array());
+        for k in 0..3 {
+            self.set(field, state, k, &[r[k][0], r[k][1], r[k][2], o[k]]);
+        }
+        self.set(field, state, 3, &[0.0, 0.0, 0.0, 1.0]);
     }
 
     /// Writes `values` as the `part`-th piece of that size in the state's row.

@@ -1,0 +1,94 @@
+//! Forward kinematics of many states.
+
+use super::Table;
+use super::checks::{actuated_values, check_legs, is_rotation, limit_status, raw_pose, then};
+use crate::forward::{Found, forward_kinematics as find};
+use crate::mechanism::Mechanism;
+use crate::modes::{self, Start};
+use crate::status::Status;
+
+/// The pose for each set of lengths of all legs (those of passive legs are not read), in the assembly mode of its
+/// guess: one for each state or one for all. `continued` starts each state from the last one that was solved \[T26\].
+#[must_use]
+pub fn forward_kinematics(
+    mech: &Mechanism,
+    lengths: &[f64],
+    guesses: Option<&[f64]>,
+    continued: bool,
+) -> Table {
+    let n = lengths.len() / mech.legs.len();
+    let (mut table, [poses, residuals, iterations]) =
+        Table::new(n, [("pose", vec![4, 4]), ("residual", vec![]), ("iterations", vec![])]);
+    let mut last = None;
+    for i in 0..n {
+        let guess = match (last, guesses) {
+            (Some(pose), _) if continued => pose,
+            (_, None) => mech.home,
+            (_, Some(guesses)) => {
+                let k = if guesses.len() == 16 { 0 } else { i };
+                if !is_rotation(guesses, k) {
+                    table.status[i] = Status::InvalidInput;
+                    continue;
+                }
+                raw_pose(guesses, k)
+            }
+        };
+        let Found { pose, residual, iterations: steps, status, .. } =
+            find(mech, &actuated_values(mech, lengths, i), &guess);
+        // A root that a constraint has only because a leg has no frame there is none.
+        let status = match then(status, || check_legs(mech, &pose)) {
+            Status::Ok => limit_status(mech, &pose),
+            other => other,
+        };
+        table.status[i] = status;
+        if !matches!(status, Status::NotConverged | Status::InvalidInput) {
+            table.set_pose(poses, i, &pose);
+            table.set(residuals, i, 0, &[residual]);
+        }
+        table.set(iterations, i, 0, &[f64::from(steps)]);
+        if !matches!(
+            status,
+            Status::NotConverged | Status::InvalidInput | Status::Singular | Status::ModeJump
+        ) {
+            last = Some(pose);
+        }
+    }
+    table
+}
+
+/// All assembly modes of each set of lengths, one after the other, and how many belong to each set \[T28\].
+#[derive(Clone, Debug)]
+pub struct AllModes {
+    /// One row for each mode.
+    pub modes: Table,
+    pub counts: Vec<usize>,
+    /// One for each set of lengths.
+    pub status: Vec<Status>,
+}
+
+#[must_use]
+pub fn assembly_modes(mech: &Mechanism, start: &Start, lengths: &[f64]) -> AllModes {
+    let n = lengths.len() / mech.legs.len();
+    let found: Vec<modes::Modes> =
+        (0..n).map(|i| modes::assembly_modes(mech, start, &actuated_values(mech, lengths, i))).collect();
+    let all: Vec<&modes::Mode> = found.iter().flat_map(|f| &f.modes).collect();
+    let names = ["determinant_sign", "above", "multiplicity", "residual"].map(|name| (name, vec![]));
+    let [sign, above, multiplicity, residual] = names;
+    let (mut table, [poses, sign, above, multiplicity, residual]) =
+        Table::new(all.len(), [("pose", vec![4, 4]), sign, above, multiplicity, residual]);
+    for (i, mode) in all.iter().enumerate() {
+        table.set_pose(poses, i, &mode.pose);
+        table.set(sign, i, 0, &[if mode.singular { 0.0 } else { mode.sign }]);
+        table.set(above, i, 0, &[f64::from(u8::from(mode.above))]);
+        table.set(multiplicity, i, 0, &[f64::from(mode.multiplicity)]);
+        table.set(residual, i, 0, &[mode.residual]);
+        table.status[i] = match then(if mode.singular { Status::Singular } else { Status::Ok }, || {
+            check_legs(mech, &mode.pose)
+        }) {
+            Status::Ok => limit_status(mech, &mode.pose),
+            other => other,
+        };
+    }
+    let counts = found.iter().map(|f| f.modes.len()).collect();
+    AllModes { modes: table, counts, status: found.iter().map(|f| f.status).collect() }
+}

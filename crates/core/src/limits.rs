@@ -1,0 +1,387 @@
+//! The limits of a mechanism, and how far a pose is from each \[T35\]-\[T38\].
+//!
+//! A margin is signed, continuous in the pose and in the unit of what it limits: positive inside, negative outside.
+//! Divided by the limit's own scale it is a pure number, so that different limits compare: the least one *binds*.
+
+use std::sync::Arc;
+
+use crate::clearance::{Hull, Segment, distance};
+use crate::joints::{self, Zero};
+use crate::leg;
+use crate::mechanism::{Leg, Mechanism, Side};
+use crate::real::{Real, Trig};
+use crate::singularity;
+use crate::spatial::{Pose, Vec3};
+use crate::spec::{JointSpec, LegSpec, LimitsSpec, RodSpec, Spec};
+use crate::status::Status;
+
+/// One limit: what it measures, the bound, and the words for it.
+#[derive(Clone, Debug)]
+pub struct Limit {
+    pub name: String,
+    pub measure: Measure,
+    pub bound: Bound,
+    /// What margins are divided by to compare them, in their unit: the width of what is allowed, or of the machine.
+    pub scale: f64,
+}
+
+/// What a limit measures. Legs count from 0.
+#[derive(Clone, Debug)]
+pub enum Measure {
+    /// Length of a leg, m.
+    Length(usize),
+    /// Angle between a leg and the cone axis of its joint, rad.
+    Cone(usize, Side),
+    /// Turn of a leg's R joint since home, rad.
+    Angle(usize, Side, Zero),
+    /// Turn of a rod since home, rad.
+    RodAngle(usize, Zero),
+    /// Distance between the surfaces of two struts, m.
+    Struts([Strut; 2]),
+    /// Distance between the surface of a strut and the platform, m.
+    Plate(Strut, Arc<Hull>),
+    /// Smallest singular value, a pure number.
+    Conditioning,
+    /// Active force of a leg, N; also its row in the Jacobian.
+    Force { leg: usize, row: usize },
+}
+
+/// A leg as a capsule about its line.
+#[derive(Clone, Copy, Debug)]
+pub struct Strut {
+    pub leg: usize,
+    pub radius: f64,
+    /// Lengths at B and at b that do not count, m.
+    pub cut: [f64; 2],
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Bound {
+    Least(f64),
+    Most(f64),
+    /// A range of an angle, on the circle.
+    Between(f64, f64),
+}
+
+impl Bound {
+    /// Least and greatest value, infinite where there is none.
+    #[must_use]
+    pub fn ends(self) -> (f64, f64) {
+        match self {
+            Bound::Least(least) => (least, f64::INFINITY),
+            Bound::Most(most) => (f64::NEG_INFINITY, most),
+            Bound::Between(min, max) => (min, max),
+        }
+    }
+
+    /// Signed slack of a value \[T35\]; of an angle, its arc to the nearer end of the range \[T36\].
+    #[inline(always)]
+    pub fn margin<T: Trig>(self, value: T) -> T {
+        match self {
+            Bound::Least(least) => value - T::lit(least),
+            Bound::Most(most) => T::lit(most) - value,
+            Bound::Between(min, max) => {
+                let off = joints::wrapped(value - T::lit(0.5 * (min + max)));
+                T::lit(0.5 * (max - min)) - T::select(off.value() < 0.0, -off, off)
+            }
+        }
+    }
+}
+
+impl Limit {
+    /// A word for its kind, the same in Python.
+    #[must_use]
+    pub fn kind(&self) -> &'static str {
+        match (&self.measure, self.bound) {
+            (Measure::Length(_), Bound::Least(_)) => "stroke min",
+            (Measure::Length(_), _) => "stroke max",
+            (Measure::Cone(_, Side::Base), _) => "base cone",
+            (Measure::Cone(_, Side::Platform), _) => "platform cone",
+            (Measure::Angle(_, Side::Base, _), _) => "base angle",
+            (Measure::Angle(_, Side::Platform, _), _) => "platform angle",
+            (Measure::RodAngle(..), _) => "rod angle",
+            (Measure::Struts(_), _) => "leg clearance",
+            (Measure::Plate(..), _) => "platform clearance",
+            (Measure::Conditioning, _) => "conditioning",
+            (Measure::Force { .. }, Bound::Least(_)) => "force min",
+            (Measure::Force { .. }, _) => "force max",
+        }
+    }
+
+    #[must_use]
+    pub fn unit(&self) -> &'static str {
+        match self.measure {
+            Measure::Length(_) | Measure::Struts(_) | Measure::Plate(..) => "m",
+            Measure::Cone(..) | Measure::Angle(..) | Measure::RodAngle(..) => "rad",
+            Measure::Conditioning => "1",
+            Measure::Force { .. } => "N",
+        }
+    }
+
+    /// The legs that it concerns; those on the rod for the turn of a rod, all for the conditioning.
+    #[must_use]
+    pub fn legs(&self, mech: &Mechanism) -> Vec<usize> {
+        match &self.measure {
+            Measure::Length(leg)
+            | Measure::Cone(leg, _)
+            | Measure::Angle(leg, ..)
+            | Measure::Force { leg, .. } => vec![*leg],
+            Measure::Struts(struts) => struts.iter().map(|s| s.leg).collect(),
+            Measure::Plate(strut, _) => vec![strut.leg],
+            Measure::RodAngle(rod, _) => {
+                (0..mech.legs.len()).filter(|&i| mech.legs[i].rod == Some(*rod)).collect()
+            }
+            Measure::Conditioning => (0..mech.legs.len()).collect(),
+        }
+    }
+
+    /// What kinematics calls a pose beyond this limit; `Ok` for limits that are none of a joint.
+    #[must_use]
+    pub fn status(&self) -> Status {
+        match self.measure {
+            Measure::Length(_) => Status::OutOfStroke,
+            Measure::Cone(..) => Status::OutOfCone,
+            Measure::Angle(..) | Measure::RodAngle(..) => Status::OutOfAngle,
+            _ => Status::Ok,
+        }
+    }
+
+    /// The measured quantity where the pose alone gives it: none for conditioning and force. No allocation.
+    #[inline(always)]
+    pub fn geometric<T: Trig>(&self, mech: &Mechanism, pose: &Pose<T>) -> Option<T> {
+        Some(match &self.measure {
+            Measure::Length(leg) => leg::position(&mech.legs[*leg], pose).length,
+            Measure::Cone(leg, side) => cone(&mech.legs[*leg], *side, pose),
+            Measure::Angle(leg, side, zero) => angle(&mech.legs[*leg], *side, zero, pose),
+            Measure::RodAngle(rod, zero) => rod_angle(mech, *rod, zero, pose),
+            Measure::Struts([a, b]) => {
+                distance(&a.in_base(mech, pose), &b.in_base(mech, pose)) - T::lit(a.radius + b.radius)
+            }
+            Measure::Plate(strut, hull) => {
+                hull.distance(&strut.in_platform(mech, pose)) - T::lit(strut.radius)
+            }
+            Measure::Conditioning | Measure::Force { .. } => return None,
+        })
+    }
+
+    /// The signed slack at a pose \[T35\]. `forces` are those of the actuators in the Jacobian's order; without them
+    /// the margin of a force is NaN.
+    #[must_use]
+    pub fn margin(&self, mech: &Mechanism, pose: &Pose<f64>, forces: Option<&[f64; 6]>) -> f64 {
+        self.bound.margin(match self.measure {
+            Measure::Conditioning => singularity::conditioning(mech, pose).sigma_min,
+            Measure::Force { row, .. } => forces.map_or(f64::NAN, |f| f[row]),
+            _ => self.geometric(mech, pose).unwrap_or(f64::NAN),
+        })
+    }
+}
+
+impl Strut {
+    fn in_base<T: Real>(&self, mech: &Mechanism, pose: &Pose<T>) -> Segment<T> {
+        let leg = &mech.legs[self.leg];
+        let b = pose.o + pose.rotation * Vec3::lift(leg.platform.point);
+        Segment(Vec3::lift(leg.base.point), b).without(self.cut)
+    }
+
+    fn in_platform<T: Real>(&self, mech: &Mechanism, pose: &Pose<T>) -> Segment<T> {
+        let leg = &mech.legs[self.leg];
+        let foot = pose.rotation.transpose_mul(Vec3::lift(leg.base.point) - pose.o);
+        Segment(foot, Vec3::lift(leg.platform.point)).without(self.cut)
+    }
+}
+
+fn cone<T: Trig>(leg: &Leg, side: Side, pose: &Pose<T>) -> T {
+    let delta = leg::position(leg, pose).delta;
+    match side {
+        Side::Base => joints::cone_angle(&leg.base, delta),
+        Side::Platform => joints::cone_angle(&leg.platform, pose.rotation.transpose_mul(delta)),
+    }
+}
+
+/// Turn of an R joint; of one on a rod, about n.
+fn angle<T: Trig>(leg: &Leg, side: Side, zero: &Zero, pose: &Pose<T>) -> T {
+    let p = leg::position(leg, pose);
+    let n = leg::frame(leg, pose, &p).n();
+    let on_rod = side == Side::Base && leg.rod.is_some();
+    joints::angles_at(leg, side, zero, &pose.rotation, n, p.delta)[usize::from(on_rod)]
+}
+
+fn rod_angle<T: Trig>(mech: &Mechanism, rod: usize, zero: &Zero, pose: &Pose<T>) -> T {
+    let leader = &mech.legs[mech.rods[rod].leader];
+    joints::rod_angle(mech, rod, zero, leg::frame(leader, pose, &leg::position(leader, pose)).n())
+}
+
+/// The signed slack of every limit in the mechanism's order, each in its own unit \[T35\].
+///
+/// Limits of joints come first, then clearances, conditioning and forces. `forces` as in [`Limit::margin`];
+/// only limits of forces need them.
+///
+/// # Panics
+/// If `out` has not one place for each limit.
+pub fn margins(mech: &Mechanism, pose: &Pose<f64>, forces: Option<&[f64; 6]>, out: &mut [f64]) {
+    assert_eq!(out.len(), mech.limits.len(), "one margin for each limit");
+    for (margin, limit) in out.iter_mut().zip(&mech.limits) {
+        *margin = limit.margin(mech, pose, forces);
+    }
+}
+
+/// The limit with the least margin relative to its scale; none where a margin is NaN, or without limits \[T35\].
+#[must_use]
+pub fn binding(mech: &Mechanism, margins: &[f64]) -> Option<usize> {
+    if margins.iter().any(|m| m.is_nan()) {
+        return None;
+    }
+    let relative = |i: &usize| margins[*i] / mech.limits[*i].scale;
+    (0..margins.len()).min_by(|a, b| relative(a).total_cmp(&relative(b)))
+}
+
+/// What kinematics calls a pose: the first limit of a joint that it breaks, strokes before cones before angles. The
+/// limits come in the mechanism's order with their margins.
+pub fn status<'a>(limits: impl Iterator<Item = (&'a Limit, f64)>) -> Status {
+    limits
+        .map(|(limit, margin)| if margin >= 0.0 { Status::Ok } else { limit.status() })
+        .find(|&status| status != Status::Ok)
+        .unwrap_or(Status::Ok)
+}
+
+// --- the list of a mechanism ---------------------------------------------------------------------------------
+
+/// The stretch of a strut at its joint that does not count is by default this many times as long as its radius and the
+/// clearance together: the strut may then lean until the sine of its angle with the plate is a third.
+const REACH: f64 = 3.0;
+
+/// All limits that a description sets: of the joints, leg by leg, then clearances, conditioning, forces. Where it sets
+/// none the list is empty.
+#[must_use]
+pub fn of(mech: &Mechanism, spec: &Spec) -> Vec<Limit> {
+    let legs: Vec<&LegSpec> = spec.legs.iter().flatten().collect();
+    let mut list = strokes(&legs);
+    list.extend(cones(&legs));
+    list.extend(angles(mech, &legs));
+    list.extend(rod_angles(mech, spec));
+    list.extend(clearances(mech, &spec.limits));
+    list.extend(spec.limits.sigma_min.map(|floor| Limit {
+        name: "conditioning".into(),
+        measure: Measure::Conditioning,
+        bound: Bound::Least(floor),
+        scale: 1.0,
+    }));
+    list.extend(forces(mech, &legs));
+    list
+}
+
+/// A least and a greatest value as two limits; `name` takes "min" or "max".
+fn both([min, max]: [f64; 2], measure: &Measure, name: impl Fn(&str) -> String) -> [Limit; 2] {
+    [("min", Bound::Least(min)), ("max", Bound::Most(max))].map(|(end, bound)| Limit {
+        name: name(end),
+        measure: measure.clone(),
+        bound,
+        scale: max - min,
+    })
+}
+
+fn strokes(legs: &[&LegSpec]) -> Vec<Limit> {
+    let of_leg = |(i, leg): (usize, &&LegSpec)| {
+        Some(both(leg.stroke?, &Measure::Length(i), |end| format!("stroke {end} of leg {}", leg.name)))
+    };
+    legs.iter().enumerate().filter_map(of_leg).flatten().collect()
+}
+
+/// Both joints of every leg.
+fn joints_of<'a>(
+    legs: &'a [&'a LegSpec],
+) -> impl Iterator<Item = (usize, &'a LegSpec, Side, &'static str, &'a JointSpec)> {
+    legs.iter().enumerate().flat_map(|(i, leg)| {
+        [(i, *leg, Side::Base, "base", &leg.base), (i, *leg, Side::Platform, "platform", &leg.platform)]
+    })
+}
+
+fn cones(legs: &[&LegSpec]) -> Vec<Limit> {
+    let of_joint = |(i, leg, side, word, joint): (usize, &LegSpec, Side, &str, &JointSpec)| {
+        let angle = joint.cone.as_ref()?.angle;
+        Some(Limit {
+            name: format!("{word} cone of leg {}", leg.name),
+            measure: Measure::Cone(i, side),
+            bound: Bound::Most(angle),
+            scale: angle,
+        })
+    };
+    joints_of(legs).filter_map(of_joint).collect()
+}
+
+fn angles(mech: &Mechanism, legs: &[&LegSpec]) -> Vec<Limit> {
+    let of_joint = |(i, leg, side, word, joint): (usize, &LegSpec, Side, &str, &JointSpec)| {
+        let [min, max] = joint.range?;
+        Some(Limit {
+            name: format!("{word} angle of leg {}", leg.name),
+            measure: Measure::Angle(i, side, Zero::of(&mech.legs[i], &mech.home)),
+            bound: Bound::Between(min, max),
+            scale: max - min,
+        })
+    };
+    joints_of(legs).filter_map(of_joint).collect()
+}
+
+fn rod_angles(mech: &Mechanism, spec: &Spec) -> Vec<Limit> {
+    let of_rod = |(i, rod): (usize, &RodSpec)| {
+        let [min, max] = rod.range?;
+        Some(Limit {
+            name: format!("angle of rod {}", rod.name),
+            measure: Measure::RodAngle(i, Zero::of(&mech.legs[mech.rods[i].leader], &mech.home)),
+            bound: Bound::Between(min, max),
+            scale: max - min,
+        })
+    };
+    spec.rods.iter().flatten().enumerate().filter_map(of_rod).collect()
+}
+
+/// Every pair of struts, then every strut and the platform \[T37\].
+fn clearances(mech: &Mechanism, whole: &LimitsSpec) -> Vec<Limit> {
+    let Some(clearance) = whole.clearance else { return vec![] };
+    let limit = |name: String, measure: Measure| Limit {
+        name,
+        measure,
+        bound: Bound::Least(clearance),
+        scale: mech.characteristic_length,
+    };
+    let struts: Vec<(usize, f64, f64)> = mech
+        .legs
+        .iter()
+        .enumerate()
+        .filter_map(|(i, leg)| {
+            let radius = leg.radius?;
+            Some((i, radius, whole.joint_reach.unwrap_or(REACH * (radius + clearance))))
+        })
+        .collect();
+    let mut list = Vec::new();
+    for (k, &(i, r1, reach1)) in struts.iter().enumerate() {
+        for &(j, r2, reach2) in &struts[k + 1..] {
+            // Joints of one body keep their distance: struts that always touch there are cut there.
+            let (a, b) = (&mech.legs[i], &mech.legs[j]);
+            let cuts = [(&a.base, &b.base), (&a.platform, &b.platform)]
+                .map(|(p, q)| (p.point - q.point).norm() <= r1 + r2 + clearance);
+            let cut = |reach: f64| cuts.map(|c| if c { reach } else { 0.0 });
+            let struts = [
+                Strut { leg: i, radius: r1, cut: cut(reach1) },
+                Strut { leg: j, radius: r2, cut: cut(reach2) },
+            ];
+            list.push(limit(format!("clearance of legs {} and {}", a.name, b.name), Measure::Struts(struts)));
+        }
+    }
+    let points: Vec<Vec3<f64>> = mech.legs.iter().map(|leg| leg.platform.point).collect();
+    let hull = Arc::new(Hull::of(&points));
+    list.extend(struts.into_iter().map(|(leg, radius, reach)| {
+        let strut = Strut { leg, radius, cut: [0.0, reach] };
+        let name = format!("clearance of leg {} and the platform", mech.legs[leg].name);
+        limit(name, Measure::Plate(strut, Arc::clone(&hull)))
+    }));
+    list
+}
+
+fn forces(mech: &Mechanism, legs: &[&LegSpec]) -> Vec<Limit> {
+    let of_row = |(row, (leg, _)): (usize, (usize, &Leg))| {
+        let name = |end: &str| format!("force {end} of leg {}", legs[leg].name);
+        Some(both(legs[leg].force?, &Measure::Force { leg, row }, name))
+    };
+    mech.actuated().enumerate().filter_map(of_row).flatten().collect()
+}

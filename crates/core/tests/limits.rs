@@ -1,0 +1,103 @@
+//! Limits of joints: what they measure and how it moves, for every leg of the catalogue.
+
+mod common;
+
+use common::{every_leg, moving, on_rod, published, states, with_leg};
+use polypod_core::joints::{self, Zero};
+use polypod_core::leg;
+use polypod_core::limits::{Bound, Limit, Measure, binding, margins};
+use polypod_core::mechanism::{Mechanism, Side};
+use polypod_core::spec::JointKind;
+
+fn limit(measure: Measure, bound: Bound) -> Limit {
+    Limit { name: String::new(), measure, bound, scale: 1.0 }
+}
+
+/// The measured quantity of each kind of joint, with what kinematics says of it and of its rate.
+fn pairs(mech: &Mechanism, state: &polypod_core::spatial::Motion<f64>) -> Vec<(Measure, [f64; 2])> {
+    let mut found = Vec::new();
+    for (i, leg) in mech.legs.iter().enumerate() {
+        let zero = Zero::of(leg, &mech.home);
+        let s = leg::state(leg, state);
+        let both = joints::angles(leg, &zero, state, &s);
+        found.push((Measure::Length(i), [s.position.length, s.end.rate]));
+        for (side, at, joint) in
+            [(Side::Base, &both[0], &leg.base), (Side::Platform, &both[1], &leg.platform)]
+        {
+            found.push((Measure::Cone(i, side), [at.cone, f64::NAN]));
+            let on_rod = side == Side::Base && leg.rod.is_some();
+            if joint.kind == JointKind::Revolute || on_rod {
+                let k = usize::from(on_rod);
+                found.push((Measure::Angle(i, side, zero), [at.angles[k], at.rates[k]]));
+            }
+        }
+        for (r, rod) in mech.rods.iter().enumerate().filter(|(_, rod)| rod.leader == i) {
+            let angle = joints::rod_angle(mech, r, &zero, s.frame.n());
+            found.push((Measure::RodAngle(r, zero), [angle, leg::rod_turn(rod.axis, &s).rate]));
+        }
+    }
+    found
+}
+
+#[test]
+fn joints_are_measured_as_kinematics_measures_them_and_move_at_their_rates() {
+    let legs = every_leg();
+    let catalogue = legs.iter().enumerate().map(|(i, letters)| with_leg(letters, i as u64 + 1));
+    let mut angles = 0;
+    for mech in catalogue.chain([on_rod(1, 3), on_rod(2, 4), on_rod(3, 5), published()]) {
+        for state in states(&mech, 4, 5) {
+            for (measure, [value, rate]) in pairs(&mech, &state) {
+                angles += usize::from(matches!(measure, Measure::Angle(..)));
+                let found =
+                    limit(measure.clone(), Bound::Least(0.0)).geometric(&mech, &moving(&state)).unwrap();
+                assert!((found.x - value).abs() < 1e-12, "{}: {measure:?} {} {value}", mech.name, found.x);
+                let off = (found.d - rate).abs();
+                assert!(rate.is_nan() || off < 1e-10 * rate.abs().max(1.0), "{}: {measure:?}", mech.name);
+            }
+        }
+    }
+    assert!(angles > 50, "the catalogue has revolute joints");
+}
+
+#[test]
+fn the_margin_of_a_range_is_continuous_around_the_circle() {
+    let range = Bound::Between(-0.5, 2.5);
+    let expected = [
+        (0.0, 0.5),
+        (1.0, 1.5),
+        (2.5, 0.0),
+        (3.0, -0.5),
+        (-0.5, 0.0),
+        (-0.7, -0.2),
+        (8.0, 2.5 + std::f64::consts::TAU - 8.0),
+    ];
+    for (angle, margin) in expected {
+        assert!((range.margin(angle) - margin).abs() < 1e-15, "{angle}");
+    }
+    let steps = 10_000;
+    let at = |i: i32| range.margin(f64::from(i) * std::f64::consts::TAU / f64::from(steps));
+    for i in 0..2 * steps {
+        assert!((at(i + 1) - at(i)).abs() < 1.001 * std::f64::consts::TAU / f64::from(steps));
+    }
+}
+
+#[test]
+fn strokes_are_all_that_the_published_manipulator_has() {
+    let mech = published();
+    let names: Vec<&str> = mech.limits.iter().map(|l| l.name.as_str()).collect();
+    assert_eq!(names.len(), 10);
+    assert_eq!(names[..2], ["stroke min of leg 1", "stroke max of leg 1"]);
+    let mut found = [0.0; 10];
+    margins(&mech, &mech.home, None, &mut found);
+    for (i, leg) in mech.legs.iter().enumerate() {
+        let length = leg::position(leg, &mech.home).length;
+        assert!((found[2 * i] - (length - 0.65)).abs() < 1e-15);
+        assert!((found[2 * i + 1] - (0.85 - length)).abs() < 1e-15);
+    }
+    // Leg 2 is the shortest of the five at home, 744 mm.
+    assert_eq!(binding(&mech, &found), Some(2));
+    found[7] = -0.01;
+    assert_eq!(binding(&mech, &found), Some(7));
+    found[0] = f64::NAN;
+    assert_eq!(binding(&mech, &found), None);
+}
