@@ -1,5 +1,6 @@
 """The compiled core: flat arrays in, a dictionary of arrays out. Use `polypod.Mechanism` instead."""
 
+from collections.abc import Sequence
 from typing import Any, final
 
 import numpy as np
@@ -8,7 +9,7 @@ from numpy.typing import NDArray
 _Array = NDArray[np.float64]
 _Table = dict[str, NDArray[Any]]
 
-__all__ = ["Faults", "Mechanism", "__version__", "statuses"]
+__all__ = ["Faults", "Flood", "Lattice", "Mechanism", "__version__", "statuses"]
 
 __version__: str
 
@@ -78,3 +79,28 @@ class Mechanism:
     ) -> tuple[list[int], _Table] | None: ...
 
 def statuses() -> list[tuple[int, str, str]]: ...
+
+@final
+class Flood:
+    @staticmethod
+    def begin(
+        mech: Mechanism,
+        origin: Sequence[float],
+        step: float,
+        counts: Sequence[int],
+        start: _Array,
+        keep_aspect: bool,
+        threads: int,
+    ) -> Flood | None: ...
+    def wave(self) -> int: ...
+    def mask(self) -> NDArray[np.bool_]: ...
+    def edges(self) -> _Table: ...
+
+@final
+class Lattice:
+    @staticmethod
+    def begin(mech: Mechanism, start: _Array, step: float, layer: float, threads: int) -> Lattice | None: ...
+    @property
+    def nodes(self) -> int: ...
+    def wave(self) -> int: ...
+    def reached(self) -> dict[str, Any]: ...

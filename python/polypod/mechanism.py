@@ -413,8 +413,8 @@ class Mechanism:
             continued: start each state from the one before, in the order of the flattened batch, as along a
                 motion; the guess then serves the first.
 
-        The status is MODE_JUMP where the guess's mode ends on the way to these lengths, so that the pose is one
-        of another mode; NOT_CONVERGED where no pose was found, and SINGULAR where two modes meet, so that the
+        The status is MODE_JUMP where the guess's mode ends on the way to these lengths: the pose is then one of
+        another mode. It is NOT_CONVERGED where no pose was found, and SINGULAR where two modes meet and the
         pose is known to about 1e-7 only. Lengths that are negative or not finite give INVALID_INPUT.
 
         >>> import polypod as pp
@@ -438,7 +438,7 @@ class Mechanism:
         Args:
             lengths: (..., n), m; those of passive legs are not read.
 
-        The first call for a mechanism finds all complex solutions for generic lengths; it takes about a second.
+        The first call for a mechanism takes about a second: it finds all complex solutions for generic lengths.
 
         Raises:
             UnsupportedError: not as many actuated legs as freedoms, or singular by design.

@@ -134,7 +134,7 @@ pub fn forward_kinematics(mech: &Mechanism, lengths: &[f64], guess: &Pose<f64>) 
         let nan = f64::NAN;
         return Found { pose: *guess, residual: nan, iterations: 0, sign: nan, status: Status::InvalidInput };
     }
-    let (continued, steps) = continuation(mech, &squares, guess);
+    let (continued, steps) = continuation(mech, &squares, guess, SHORTEST_PIECE);
     if let Some(pose) = continued {
         let found = polish(mech, &squares, &pose);
         return Found { iterations: steps + found.iterations, ..found };
@@ -145,9 +145,15 @@ pub fn forward_kinematics(mech: &Mechanism, lengths: &[f64], guess: &Pose<f64>) 
 }
 
 /// Follows the solutions of `F = (1 - t) F(guess)` from the guess at t = 0 to t = 1 by Newton's method, in one piece if
-/// it contracts, else in as many as it takes \[T27\]. None where the determinant would change its sign: a singularity
-/// lies on the path. Tells the number of Newton steps.
-fn continuation(mech: &Mechanism, squares: &[f64; 6], guess: &Pose<f64>) -> (Option<Pose<f64>>, u32) {
+/// it contracts, else in as many as it takes \[T27\]. None where the determinant would change its sign or pieces shorter
+/// than `shortest` be needed: a singularity lies on the path. Tells the number of Newton steps.
+#[must_use]
+pub fn continuation(
+    mech: &Mechanism,
+    squares: &[f64; 6],
+    guess: &Pose<f64>,
+    shortest: f64,
+) -> (Option<Pose<f64>>, u32) {
     let errors = system(mech, guess, squares).residual;
     let sign = newton(mech, guess, squares, &[0.0; 6]).sign;
     let (mut pose, mut t, mut piece, mut steps) = (*guess, 0.0, 1.0_f64, 0);
@@ -174,7 +180,7 @@ fn continuation(mech: &Mechanism, squares: &[f64; 6], guess: &Pose<f64>) -> (Opt
             (pose, t, piece) = (trial, t + piece, 2.0 * piece);
         } else {
             piece *= 0.5;
-            if piece < SHORTEST_PIECE {
+            if piece < shortest {
                 return (None, steps);
             }
         }

@@ -3,6 +3,8 @@
 // Arguments arrive from Python by value.
 #![allow(clippy::needless_pass_by_value)]
 
+mod workspace;
+
 use std::sync::OnceLock;
 
 use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray1};
@@ -66,6 +68,10 @@ type CoordinateSet = (&'static str, Vec<&'static str>, Option<Vec<bool>>);
 struct PyMechanism(Mechanism, OnceLock<Option<Start>>);
 
 impl PyMechanism {
+    fn core(&self) -> &Mechanism {
+        &self.0
+    }
+
     /// One length for each leg in every row.
     fn lengths<'a>(&self, array: &'a Array<'_>) -> PyResult<&'a [f64]> {
         let lengths = slice(array)?;
@@ -382,5 +388,7 @@ fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add("__version__", env!("CARGO_PKG_VERSION"))?;
     m.add("Faults", m.py().get_type::<Faults>())?;
     m.add_class::<PyMechanism>()?;
+    m.add_class::<workspace::PyFlood>()?;
+    m.add_class::<workspace::PyLattice>()?;
     m.add_function(wrap_pyfunction!(statuses, m)?)
 }

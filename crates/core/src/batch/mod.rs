@@ -30,6 +30,15 @@ pub struct Field {
     pub data: Vec<f64>,
 }
 
+/// The pose that sixteen numbers are, rows of the homogeneous matrix.
+///
+/// # Panics
+/// If there are fewer.
+#[must_use]
+pub fn pose_of(matrix: &[f64]) -> Pose<f64> {
+    checks::raw_pose(matrix, 0)
+}
+
 /// Named output arrays over the states, all NaN until set.
 #[derive(Clone, Debug)]
 pub struct Table {

@@ -1,0 +1,220 @@
+//! The reachable workspace in pose space: the nodes of a grid at which the platform's point o can be, found from a start
+//! pose outwards, and where its boundary cuts the edges of the grid \[T40\].
+
+use std::collections::BTreeMap;
+
+use rayon::prelude::*;
+
+use crate::jacobian::scaled_jacobian;
+use crate::linear::solve;
+use crate::mechanism::Mechanism;
+use crate::reach::{fit, nearest_limit};
+use crate::spatial::{Mat3, Pose, Vec3};
+
+/// A cubic grid; its nodes are counted with z fastest.
+#[derive(Clone, Copy, Debug)]
+pub struct Grid {
+    pub origin: Vec3<f64>,
+    pub step: f64,
+    pub counts: [usize; 3],
+}
+
+/// The six neighbours of a node.
+const DIRECTIONS: [[i64; 3]; 6] = [[-1, 0, 0], [1, 0, 0], [0, -1, 0], [0, 1, 0], [0, 0, -1], [0, 0, 1]];
+
+/// Pieces of the way between two nodes at whose ends the sign of det J is compared.
+const PIECES: u32 = 4;
+
+/// How exactly the boundary is found on an edge, m.
+const EXACT: f64 = 1e-12;
+
+/// Margin, in the limit's unit, at which it is what stops the platform.
+const AT_LIMIT: f64 = 1e-9;
+
+impl Grid {
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.counts.iter().product()
+    }
+
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    fn place(&self, node: usize) -> [i64; 3] {
+        let [_, ny, nz] = self.counts;
+        [node / (ny * nz), node / nz % ny, node % nz].map(|i| i as i64)
+    }
+
+    fn point(&self, place: [i64; 3]) -> Vec3<f64> {
+        let [x, y, z] = place.map(|i| i as f64 * self.step);
+        self.origin + Vec3::new(x, y, z)
+    }
+
+    fn node(&self, place: [i64; 3]) -> Option<usize> {
+        let inside = place.iter().zip(self.counts).all(|(&i, n)| i >= 0 && i < n as i64);
+        let [x, y, z] = place.map(|i| i as usize);
+        inside.then(|| (x * self.counts[1] + y) * self.counts[2] + z)
+    }
+
+    fn neighbour(&self, node: usize, direction: usize) -> [i64; 3] {
+        let place = self.place(node);
+        std::array::from_fn(|k| place[k] + DIRECTIONS[direction][k])
+    }
+}
+
+/// The reachable nodes, spreading wave by wave. Rotations are kept where a wave may still need them.
+#[derive(Clone, Debug)]
+pub struct Flood {
+    pub grid: Grid,
+    /// Whether each node is reachable.
+    pub mask: Vec<bool>,
+    rotations: BTreeMap<usize, Mat3<f64>>,
+    fresh: Vec<usize>,
+    /// The sign of det J that must be kept, if singularities are not to be crossed.
+    sign: Option<f64>,
+}
+
+impl Flood {
+    /// Begins at the node next to the start pose; none if it cannot be reached from there.
+    #[must_use]
+    pub fn new(mech: &Mechanism, grid: Grid, start: &Pose<f64>, keep_aspect: bool) -> Option<Self> {
+        let off = (start.o - grid.origin) * (1.0 / grid.step);
+        let node = grid.node(off.array().map(|x| x.round() as i64))?;
+        let sign = keep_aspect.then(|| sign(mech, start));
+        let first = fit(mech, start, start.o)?;
+        let pose = moved(mech, &first, grid.point(grid.place(node)), sign)?;
+        let mut mask = vec![false; grid.len()];
+        mask[node] = true;
+        Some(Flood {
+            grid,
+            mask,
+            rotations: BTreeMap::from([(node, pose.rotation)]),
+            fresh: vec![node],
+            sign,
+        })
+    }
+
+    /// Tries every unreached neighbour of the nodes that the last wave reached; the number of new ones. Each is tried from
+    /// what was known before the wave, so that the result does not depend on the number of threads.
+    pub fn wave(&mut self, mech: &Mechanism) -> usize {
+        let mut candidates: Vec<usize> = self
+            .fresh
+            .iter()
+            .flat_map(|&node| (0..6).map(move |d| (node, d)))
+            .filter_map(|(node, d)| self.grid.node(self.grid.neighbour(node, d)))
+            .filter(|&node| !self.mask[node])
+            .collect();
+        candidates.sort_unstable();
+        candidates.dedup();
+        let found: Vec<(usize, Mat3<f64>)> = candidates
+            .par_iter()
+            .filter_map(|&node| {
+                let o = self.grid.point(self.grid.place(node));
+                let from = |d: usize| {
+                    let neighbour = self.grid.node(self.grid.neighbour(node, d))?;
+                    let rotation = *self.rotations.get(&neighbour)?;
+                    let pose = Pose { rotation, o: self.grid.point(self.grid.place(neighbour)) };
+                    moved(mech, &pose, o, self.sign)
+                };
+                (0..6).find_map(from).map(|pose| (node, pose.rotation))
+            })
+            .collect();
+        for &(node, rotation) in &found {
+            self.mask[node] = true;
+            self.rotations.insert(node, rotation);
+        }
+        // Inner nodes are of no more use.
+        let touched: Vec<usize> =
+            self.fresh.iter().chain(found.iter().map(|(node, _)| node)).copied().collect();
+        for node in touched {
+            let around = (0..6).map(|d| self.grid.node(self.grid.neighbour(node, d)));
+            if around.into_iter().all(|n| n.is_some_and(|n| self.mask[n])) {
+                self.rotations.remove(&node);
+            }
+        }
+        self.fresh = found.into_iter().map(|(node, _)| node).collect();
+        self.fresh.len()
+    }
+
+    /// Where the boundary cuts the edges between reached and unreached nodes, in the order of the reached ones.
+    #[must_use]
+    pub fn edges(&self, mech: &Mechanism) -> Vec<Edge> {
+        let open: Vec<(usize, usize, Mat3<f64>)> = self
+            .rotations
+            .iter()
+            .flat_map(|(&node, &rotation)| (0..6).map(move |d| (node, d, rotation)))
+            .filter(|&(node, d, _)| {
+                self.grid.node(self.grid.neighbour(node, d)).is_none_or(|n| !self.mask[n])
+            })
+            .collect();
+        open.par_iter().map(|&(node, d, rotation)| self.edge(mech, node, d, rotation)).collect()
+    }
+
+    /// Bisects an edge for the last place that can be reached from its inner node.
+    fn edge(&self, mech: &Mechanism, node: usize, direction: usize, rotation: Mat3<f64>) -> Edge {
+        let inner = self.grid.point(self.grid.place(node));
+        let way = self.grid.point(self.grid.neighbour(node, direction)) - inner;
+        let mut pose = Pose { rotation, o: inner };
+        let (mut low, mut high) = (0.0, 1.0);
+        while (high - low) * self.grid.step > EXACT {
+            let middle = 0.5 * (low + high);
+            match moved(mech, &pose, inner + way * middle, self.sign) {
+                Some(next) => (pose, low) = (next, middle),
+                None => high = middle,
+            }
+        }
+        let nearest = nearest_limit(mech, &pose);
+        let beyond = || fit(mech, &pose, inner + way * high);
+        let stop = match (nearest, self.sign) {
+            _ if high >= 1.0 && low >= 1.0 - EXACT / self.grid.step => Stop::Grid,
+            (Some((limit, margin)), _) if margin <= AT_LIMIT => Stop::Limit(limit),
+            (_, Some(kept)) if beyond().is_none_or(|p| sign(mech, &p) != kept) => Stop::Singularity,
+            _ => Stop::Search,
+        };
+        Edge { node, direction, share: low, pose, stop, margin: nearest.map_or(f64::NAN, |(_, m)| m) }
+    }
+}
+
+/// Where the boundary cuts an edge of the grid.
+#[derive(Clone, Copy, Debug)]
+pub struct Edge {
+    /// The reached node and the direction of the edge.
+    pub node: usize,
+    pub direction: usize,
+    /// Share of the edge inside.
+    pub share: f64,
+    /// The last pose.
+    pub pose: Pose<f64>,
+    pub stop: Stop,
+    /// The margin of the limit nearest to it, relative to its scale, in its own unit; NaN without limits.
+    pub margin: f64,
+}
+
+/// What keeps the platform from going further.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Stop {
+    Limit(usize),
+    /// Beyond, the sign of det J would change.
+    Singularity,
+    /// The grid ends here, not the workspace.
+    Grid,
+    /// Neither: the search found no pose beyond though no limit binds.
+    Search,
+}
+
+/// A pose at `o` from one nearby, if there is one; with the sign of det J kept on the way, if it is given.
+fn moved(mech: &Mechanism, pose: &Pose<f64>, o: Vec3<f64>, kept: Option<f64>) -> Option<Pose<f64>> {
+    let Some(kept) = kept else { return fit(mech, pose, o) };
+    let (from, mut pose) = (pose.o, *pose);
+    for k in 1..=PIECES {
+        let t = f64::from(k) / f64::from(PIECES);
+        pose = fit(mech, &pose, from * (1.0 - t) + o * t).filter(|p| sign(mech, p) == kept)?;
+    }
+    Some(pose)
+}
+
+fn sign(mech: &Mechanism, pose: &Pose<f64>) -> f64 {
+    solve(scaled_jacobian(mech, pose), [0.0; 6]).sign
+}

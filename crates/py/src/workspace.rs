@@ -1,0 +1,151 @@
+//! Searches of the workspace, one wave at a time, so that the caller can show progress and stop.
+
+use numpy::{PyArray1, PyArrayMethods};
+use polypod_core::batch::pose_of;
+use polypod_core::lattice::Lattice;
+use polypod_core::spatial::Vec3;
+use polypod_core::workspace::{Flood, Grid, Stop};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use rayon::{ThreadPool, ThreadPoolBuilder};
+
+use crate::{Array, PyMechanism, slice};
+
+/// Codes of what stops the platform where it is no limit.
+const SINGULARITY: i64 = -1;
+const GRID: i64 = -2;
+const SEARCH: i64 = -3;
+
+/// Threads of a search; all cores for zero.
+fn pool(threads: usize) -> PyResult<ThreadPool> {
+    ThreadPoolBuilder::new()
+        .num_threads(threads)
+        .build()
+        .map_err(|e| PyValueError::new_err(format!("threads: {e}")))
+}
+
+fn start_pose(start: &Array<'_>) -> PyResult<polypod_core::spatial::Pose<f64>> {
+    let start = slice(start)?;
+    if start.len() == 16 { Ok(pose_of(start)) } else { Err(PyValueError::new_err("needs one start pose")) }
+}
+
+#[pyclass(name = "Flood")]
+pub struct PyFlood {
+    mech: Py<PyMechanism>,
+    flood: Flood,
+    pool: ThreadPool,
+}
+
+#[pymethods]
+impl PyFlood {
+    /// None if the node next to the start pose cannot be reached from it.
+    #[staticmethod]
+    #[allow(clippy::too_many_arguments)]
+    fn begin(
+        mech: Py<PyMechanism>,
+        origin: [f64; 3],
+        step: f64,
+        counts: [usize; 3],
+        start: Array<'_>,
+        keep_aspect: bool,
+        threads: usize,
+    ) -> PyResult<Option<Self>> {
+        let grid = Grid { origin: Vec3::from(origin), step, counts };
+        let flood = Flood::new(mech.get().core(), grid, &start_pose(&start)?, keep_aspect);
+        let pool = pool(threads)?;
+        Ok(flood.map(|flood| PyFlood { mech, flood, pool }))
+    }
+
+    /// The number of nodes that the next wave reaches.
+    fn wave(&mut self, py: Python<'_>) -> usize {
+        let (mech, pool, flood) = (self.mech.get().core(), &self.pool, &mut self.flood);
+        py.detach(|| pool.install(|| flood.wave(mech)))
+    }
+
+    /// Which nodes are reached, flat, z fastest.
+    fn mask<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<bool>> {
+        PyArray1::from_slice(py, &self.flood.mask)
+    }
+
+    /// The cut edges: reached node, direction (-x, x, -y, y, -z, z), share inside, pose, what stops it, margin.
+    fn edges<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let (mech, pool, flood) = (self.mech.get().core(), &self.pool, &self.flood);
+        let edges = py.detach(|| pool.install(|| flood.edges(mech)));
+        let stop = |stop: Stop| match stop {
+            Stop::Limit(i) => i as i64,
+            Stop::Singularity => SINGULARITY,
+            Stop::Grid => GRID,
+            Stop::Search => SEARCH,
+        };
+        let mut poses = Vec::with_capacity(16 * edges.len());
+        for edge in &edges {
+            let (r, o) = (edge.pose.rotation.rows(), edge.pose.o.array());
+            for k in 0..3 {
+                poses.extend_from_slice(&[r[k][0], r[k][1], r[k][2], o[k]]);
+            }
+            poses.extend_from_slice(&[0.0, 0.0, 0.0, 1.0]);
+        }
+        let n = edges.len();
+        let result = PyDict::new(py);
+        result.set_item("node", PyArray1::from_vec(py, edges.iter().map(|e| e.node as i64).collect()))?;
+        let directions = edges.iter().map(|e| e.direction as i64).collect();
+        result.set_item("direction", PyArray1::from_vec(py, directions))?;
+        result.set_item("share", PyArray1::from_vec(py, edges.iter().map(|e| e.share).collect()))?;
+        result.set_item("pose", PyArray1::from_vec(py, poses).reshape([n, 4, 4])?)?;
+        result.set_item("stop", PyArray1::from_vec(py, edges.iter().map(|e| stop(e.stop)).collect()))?;
+        result.set_item("margin", PyArray1::from_vec(py, edges.iter().map(|e| e.margin).collect()))?;
+        Ok(result)
+    }
+}
+
+#[pyclass(name = "Lattice")]
+pub struct PyLattice {
+    mech: Py<PyMechanism>,
+    lattice: Lattice,
+    pool: ThreadPool,
+}
+
+#[pymethods]
+impl PyLattice {
+    /// None where an actuated leg has no stroke, or no pose in the start's mode has the lengths next to the start's.
+    #[staticmethod]
+    fn begin(
+        mech: Py<PyMechanism>,
+        start: Array<'_>,
+        step: f64,
+        layer: f64,
+        threads: usize,
+    ) -> PyResult<Option<Self>> {
+        let lattice = Lattice::new(mech.get().core(), &start_pose(&start)?, step, layer);
+        let pool = pool(threads)?;
+        Ok(lattice.map(|lattice| PyLattice { mech, lattice, pool }))
+    }
+
+    /// The number of nodes that the next wave reaches.
+    fn wave(&mut self, py: Python<'_>) -> usize {
+        let (mech, pool, lattice) = (self.mech.get().core(), &self.pool, &mut self.lattice);
+        py.detach(|| pool.install(|| lattice.wave(mech)))
+    }
+
+    #[getter]
+    fn nodes(&self) -> usize {
+        self.lattice.len()
+    }
+
+    /// Counts, extents (3, 2), the profile (layers, 4) of least and greatest x and y, lower end and height of layers.
+    fn reached<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let reached = &self.lattice.reached;
+        let result = PyDict::new(py);
+        result.set_item("inside", reached.inside)?;
+        result.set_item("outside", reached.outside)?;
+        result.set_item("ends", reached.ends)?;
+        let extents = reached.extents.as_flattened().to_vec();
+        result.set_item("extents", PyArray1::from_vec(py, extents).reshape([3, 2])?)?;
+        let profile = reached.profile.as_flattened().to_vec();
+        let layers = reached.profile.len();
+        result.set_item("profile", PyArray1::from_vec(py, profile).reshape([layers, 4])?)?;
+        result.set_item("layers", self.lattice.layers)?;
+        Ok(result)
+    }
+}
