@@ -20,6 +20,7 @@ from polypod.errors import (
     UnknownNameError,
 )
 from polypod.mechanism import Mechanism, list_mechanisms, load
+from polypod.singularity import SingularityKind
 from polypod.status import Status
 
 if TYPE_CHECKING:
@@ -45,6 +46,7 @@ __all__ = [
     "MotionError",
     "PolypodError",
     "ShapeError",
+    "SingularityKind",
     "Solution",
     "SolutionError",
     "Status",

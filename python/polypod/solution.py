@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from typing import Any
 
@@ -14,7 +15,9 @@ from polypod import _core
 from polypod.answers import State
 from polypod.mechanism import Mechanism
 from polypod.motion import Motion
+from polypod.passages import find_passages
 from polypod.results import Solution
+from polypod.singularity import Determinant
 from polypod.status import Status
 
 CHUNK = 20_000
@@ -74,6 +77,8 @@ VARIABLES: dict[str, tuple[tuple[str, ...], str, str, str]] = {
     "actuator_work": (_TIME, "J", "", "work of the actuators since the start"),
     "sigma_min": (_TIME, "1", "σ_min", "smallest singular value of the leg Jacobian"),
     "condition": (_TIME, "1", "", "condition number of the leg Jacobian"),
+    "determinant": (_TIME, "1", "det J", "determinant of the Jacobian in pure numbers"),
+    "determinant_rate": (_TIME, "1/s", "(det J)'", "rate of the determinant"),
 }
 _LENGTHS = {"x", "y", "z", "p", "h", "tip_x", "tip_y", "tip_z"}
 _PURE = {"axis_x", "axis_y", "axis_z"}
@@ -96,6 +101,7 @@ def solve(mech: Mechanism, motion: Motion, *, progress: Callable[[int, int], Non
 
     Returns:
         A `Solution`, whose dataset has one variable for each quantity, SI, and the `Status` of every state.
+        Its `singularities` tell which singular poses the motion crosses or comes near, also between samples.
 
     >>> import polypod as pp
     >>> mech = pp.load("lu-3spu-2rpu-r")
@@ -121,7 +127,10 @@ def solve(mech: Mechanism, motion: Motion, *, progress: Callable[[int, int], Non
         values["actuator_work"][:known] = cumulative_simpson(
             power[:known], x=motion.time[:known], initial=0.0
         )
-    return Solution(_dataset(mech, motion, values))
+    determinant = Determinant(values["determinant"], values["determinant_rate"], values["status"])
+    passages = find_passages(mech, motion, state.pose, determinant)
+    dataset = _dataset(mech, motion, values)
+    return Solution(dataset.assign_attrs(singularities=json.dumps(passages, ensure_ascii=False)))
 
 
 def _solve_chunk(mech: Mechanism, motion: Motion, state: State, chunk: slice) -> dict[str, NDArray[Any]]:
@@ -135,7 +144,7 @@ def _solve_chunk(mech: Mechanism, motion: Motion, state: State, chunk: slice) ->
     load = (wrench, motion.wrench_axes)
     dynamics = mech.inverse_dynamics(pose, twist, acceleration, *load)
     power = mech.power(pose, twist, acceleration, *load)
-    conditioning = mech.conditioning(pose)
+    conditioning, determinant = mech.conditioning(pose), mech.determinant(pose, twist)
     # The first thing that went wrong explains the rest.
     found = state.status[chunk]
     status = np.where(found != Status.OK, found, dynamics.status)
@@ -176,6 +185,8 @@ def _solve_chunk(mech: Mechanism, motion: Motion, state: State, chunk: slice) ->
         "power_residual": power.residual,
         "sigma_min": conditioning.sigma_min,
         "condition": conditioning.condition,
+        "determinant": determinant.determinant,
+        "determinant_rate": determinant.rate,
         "status": status.astype(np.int8),
     }
     for suffix, as_printed in (("", False), ("_as_printed", True)) if mech.coupled_legs else ():

@@ -4,13 +4,15 @@ mod checks;
 mod coordinates;
 mod dynamics;
 mod kinematics;
+mod singularity;
 
 pub use checks::CONSTRAINT_TOLERANCE;
 pub use coordinates::{Coordinates, coordinate_values, states};
 pub use dynamics::{Loads, coupled_forces, inverse_dynamics, power};
 pub use kinematics::{
-    conditioning, hessians, inverse_kinematics, jacobians, kinematics, platform_acceleration, platform_twist,
+    hessians, inverse_kinematics, jacobians, kinematics, platform_acceleration, platform_twist,
 };
+pub use singularity::{conditioning, determinants, nearest_singular, searched_coordinates, singularities};
 
 use crate::mechanism::Mechanism;
 use crate::spatial::{Acceleration, Motion, Twist};
