@@ -563,6 +563,17 @@ def test_distance_with_dependent_coordinates():
     assert np.array_equal(named.singular, found.singular)
 
 
+@pytest.mark.parametrize("turned", [0.3, 0.05])
+def test_distance_to_a_constraint_singularity(turned):
+    """Where the constraints are lost the dependent coordinates are, too; the kind is told all the same."""
+    angle = np.pi - turned
+    pose = matrix((o.turn([0.0, angle, 0.0]), np.array([-0.075 * (1 - np.cos(angle)), 0.0, 0.4])))
+    found = RPS.singularity_distance(pose, coordinates=["z", "rx", "ry"])
+    assert found.value[2] == pytest.approx(turned)
+    assert found.singular[2, 0] == pytest.approx(0.0, abs=1e-6)
+    assert found.kind[2, 0] == Kind.CONSTRAINT
+
+
 def test_distance_of_a_batch_and_without_answer():
     poses = np.stack([LU.pose(NATURAL), np.full((4, 4), np.nan)])
     found = LU.singularity_distance(poses)

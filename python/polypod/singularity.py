@@ -113,7 +113,10 @@ class SingularityDistance(NamedTuple):
     distance: Array
     """(..., k, 2): |singular - value|."""
     kind: Kinds
-    """(..., k, 2): `SingularityKind` there; NONE where there is none in reach."""
+    """(..., k, 2): `SingularityKind` there; NONE where there is none in reach.
+
+    UNKNOWN where det J changes its sign, but no singular pose is known.
+    """
     searched: Array
     """(..., k, 2): value up to which poses were looked at: the reach, or where poses end."""
     status: Codes

@@ -3,7 +3,7 @@
 use std::cell::Cell;
 use std::f64::consts::PI;
 
-use crate::coordinates::{self, MAX_COORDINATES, Set, Values};
+use crate::coordinates::{self, MAX_COORDINATES, Set, State, Values};
 use crate::mechanism::Mechanism;
 use crate::real::{Jet, Real};
 use crate::roots::{self, Node};
@@ -16,7 +16,8 @@ use crate::status::Status;
 pub struct Nearest {
     /// The coordinate's value there; infinite in the direction where there is none.
     pub value: f64,
-    pub kind: Kind,
+    /// None where det J changes its sign without a singular pose that is known.
+    pub kind: Option<Kind>,
     /// The coordinate's value up to which poses were looked at.
     pub searched: f64,
 }
@@ -37,6 +38,13 @@ const STEPS: [f64; 3] = [PI / 180.0, 0.02, 0.01];
 /// How far angles and a direction's components go: a full turn, and from one end to the other.
 const TURN: f64 = 2.0 * PI;
 const ACROSS: f64 = 2.0;
+
+/// Measures up to which the last pose before poses end is singular: near a fold poses go by the root of the coordinate.
+const END_TOLERANCE: f64 = 1e-3;
+
+/// Shares of a step before a zero at which a pose is looked for in turn, and up to which its measures tell the kind.
+const SHORTLY_BEFORE: [f64; 5] = [1e-5, 1e-4, 1e-3, 1e-2, 1e-1];
+const NEAR: f64 = 0.01;
 
 /// Two poses this near, as pure numbers, are one.
 const SAME_POSE: f64 = 1e-6;
@@ -80,41 +88,91 @@ fn same(a: &Pose<f64>, b: &Pose<f64>, scale: f64) -> bool {
     (a.o - b.o).norm() <= SAME_POSE * scale && turned.fold(0.0, f64::max) <= SAME_POSE
 }
 
+/// The poses that one coordinate passes, by the way from its value at the start; the others are kept.
+struct Path<'a> {
+    mech: &'a Mechanism,
+    search: &'a Search,
+    given: Vec<bool>,
+    start: Values<f64>,
+    branch: f64,
+    index: usize,
+    direction: f64,
+    /// Where the dependent coordinates start from: the last pose, so that they follow their own path.
+    last: Cell<Pose<f64>>,
+}
+
+impl Path<'_> {
+    /// The coordinate's value after a way.
+    fn place(&self, way: f64) -> f64 {
+        self.start[self.index] + self.direction * way
+    }
+
+    fn state(&self, way: f64) -> State {
+        let mut q = self.start.map(Jet::lit);
+        q[self.index] = Jet::new(self.place(way), self.direction, 0.0);
+        coordinates::state(self.mech, &self.search.set, &q, &self.given, self.branch, &self.last.get())
+    }
+
+    fn pose(&self, way: f64) -> Option<Pose<f64>> {
+        let state = self.state(way);
+        (state.status == Status::Ok).then_some(state.platform.pose)
+    }
+
+    /// det J and its rate, as long as dependent coordinates are on the branch `side`: beyond a fold is another path.
+    fn node(&self, way: f64, side: f64) -> Option<Node> {
+        let State { platform, branch, status, .. } = self.state(way);
+        if status != Status::Ok || branch != side {
+            return None;
+        }
+        self.last.set(platform.pose);
+        let det = singularity::determinant(self.mech, &platform.pose, &platform.twist, self.search.scale);
+        det.x.is_finite().then_some(Node { t: way, f: det.x, d: det.d })
+    }
+
+    /// What is singular about a pose, if anything is.
+    fn kind(&self, pose: &Pose<f64>, tolerance: f64) -> Option<Kind> {
+        let found = singularity::singularity(self.mech, pose, self.search.scale, tolerance);
+        Some(found.kind).filter(|&kind| kind != Kind::None)
+    }
+
+    /// The kind where det J is zero. Where a constraint is lost the dependent coordinates are not determined: a pose
+    /// shortly before tells it then.
+    fn kind_at_zero(&self, way: f64, step: f64) -> Option<Kind> {
+        let here = self.pose(way).and_then(|pose| self.kind(&pose, TOLERANCE));
+        here.or_else(|| {
+            let before =
+                SHORTLY_BEFORE.into_iter().find_map(|share| self.pose((way - share * step).max(0.0)));
+            before.and_then(|pose| self.kind(&pose, NEAR))
+        })
+    }
+}
+
 /// The nearest singular pose when coordinate `index` goes from its value in `q` up (`direction` 1) or down (-1).
 #[must_use]
 pub fn along(
     mech: &Mechanism,
     search: &Search,
     pose: &Pose<f64>,
-    (q, branch): (&Values<f64>, f64),
+    (start, branch): (&Values<f64>, f64),
     index: usize,
     direction: f64,
 ) -> Nearest {
-    let (scale, given) = (search.scale, mask(search));
-    // Dependent coordinates start from the last pose, so that they follow their own path.
-    let last = Cell::new(*pose);
-    let state_at = |x: f64| {
-        let mut moved = q.map(Jet::lit);
-        moved[index] = Jet::new(q[index] + direction * x, direction, 0.0);
-        coordinates::state(mech, &search.set, &moved, &given, branch, &last.get())
+    let (given, last) = (mask(search), Cell::new(*pose));
+    let path = Path { mech, search, given, start: *start, branch, index, direction, last };
+    let side = path.state(0.0).branch;
+    let touches = |way: f64| {
+        path.pose(way).is_some_and(|pose| singularity::smallest(mech, &pose, search.scale) <= TOLERANCE)
     };
-    let side = state_at(0.0).branch;
-    let node_at = |x: f64| {
-        let state = state_at(x);
-        // The dependent coordinates must stay on their branch: beyond a fold there is another path.
-        if state.status != Status::Ok || state.branch != side {
-            return None;
-        }
-        let det = singularity::determinant(mech, &state.platform.pose, &state.platform.twist, scale);
-        last.set(state.platform.pose);
-        det.x.is_finite().then_some(Node { t: x, f: det.x, d: det.d })
-    };
-    let touches = |x: f64| singularity::smallest(mech, &state_at(x).platform.pose, scale) <= TOLERANCE;
     let (step, reach) = search.extent(index);
-    let found = roots::first_zero(node_at, touches, step, reach);
-    let place = |x: f64| q[index] + direction * x;
-    let kind = found.zero.map_or(Kind::None, |x| {
-        singularity::singularity(mech, &state_at(x).platform.pose, scale, TOLERANCE).kind
-    });
-    Nearest { value: found.zero.map_or(direction * f64::INFINITY, place), kind, searched: place(found.end) }
+    let found = roots::first_zero(|way| path.node(way, side), touches, step, reach);
+    let none =
+        Nearest { value: direction * f64::INFINITY, kind: Some(Kind::None), searched: path.place(found.end) };
+    if let Some(zero) = found.zero {
+        return Nearest { value: path.place(zero), kind: path.kind_at_zero(zero, step), ..none };
+    }
+    // Where poses end, they end at a singular one or at a fold of the coordinates alone.
+    match path.kind(&path.last.get(), END_TOLERANCE) {
+        Some(kind) if found.end < reach => Nearest { value: none.searched, kind: Some(kind), ..none },
+        _ => none,
+    }
 }

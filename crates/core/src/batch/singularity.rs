@@ -146,7 +146,7 @@ pub fn nearest_singular(mech: &Mechanism, poses: &[f64], search: &Search) -> Tab
             table.set(value, i, k, &[q[index]]);
             let both = [-1.0, 1.0].map(|d| nearest::along(mech, search, &pose, (&q, branch), index, d));
             table.set(singular, i, k, &both.map(|b| b.value));
-            table.set(kind, i, k, &both.map(|b| f64::from(b.kind as u8)));
+            table.set(kind, i, k, &both.map(|b| b.kind.map_or(f64::NAN, |kind| f64::from(kind as u8))));
             table.set(searched, i, k, &both.map(|b| b.searched));
         }
     }
