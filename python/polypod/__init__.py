@@ -21,6 +21,7 @@ from polypod.errors import (
     UnsupportedError,
 )
 from polypod.mechanism import Mechanism, list_mechanisms, load
+from polypod.singularity import SingularityKind
 from polypod.status import Status
 
 if TYPE_CHECKING:
@@ -46,6 +47,7 @@ __all__ = [
     "MotionError",
     "PolypodError",
     "ShapeError",
+    "SingularityKind",
     "Solution",
     "SolutionError",
     "Status",

@@ -376,6 +376,8 @@ def _print_solution(out: Console, facts: dict[str, Any]) -> None:
         out.print(passed)
     if coupled:
         out.print(f"Note: {coupled['note']}.")
+    for warning in facts["singularities"]["warnings"]:
+        out.print(f"[bold yellow]Warning:[/bold yellow] {escape(warning)}")
 
     if facts["outcomes"]:
         outcomes = _table("Outcomes other than OK", "status", "states>", "first at / s>", "meaning")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 import json
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -38,17 +38,23 @@ from polypod.errors import (
     CoordinateError,
     Fault,
     MechanismError,
+    PolypodError,
     ShapeError,
     UnknownNameError,
     UnsupportedError,
     alternatives,
 )
 from polypod.schema import read_spec
+from polypod.singularity import (
+    NEAR_SINGULAR,
+    TOLERANCE,
+    Determinant,
+    Singularity,
+    SingularityDistance,
+    codes,
+)
 from polypod.status import Status
 from polypod.units import readable
-
-NEAR_SINGULAR = 0.01
-"""Smallest singular value (a pure number) below which a pose is called nearly singular."""
 
 
 class Mechanism:
@@ -395,10 +401,119 @@ class Mechanism:
         out = _shaped(self._core.platform_acceleration(*arrays), shape)
         return out["acceleration"], out["status"]
 
-    def conditioning(self, pose: ArrayLike) -> Conditioning:
-        """Singular values of the leg Jacobian on the allowed twists, in `characteristic_length` [T24]."""
+    # --- singularities -----------------------------------------------------------------------------------
+
+    def conditioning(self, pose: ArrayLike, *, length: float | None = None) -> Conditioning:
+        """Singular values of the leg Jacobian on the allowed twists [T24].
+
+        `length`, m, is what turns are counted with: an angle is an arc of that radius; by default the
+        `characteristic_length`.
+        """
         shape, (poses,) = self._batch(pose=(pose, (4, 4)))
-        return Conditioning(**_shaped(self._core.conditioning(poses), shape))
+        return Conditioning(**_shaped(self._core.conditioning(poses, self._length(length)), shape))
+
+    def determinant(
+        self, pose: ArrayLike, twist: ArrayLike = (0.0,) * 6, *, length: float | None = None
+    ) -> Determinant:
+        """Determinant of J in pure numbers, and its exact rate along a twist [T30].
+
+        Args:
+            pose: (..., 4, 4).
+            twist: (..., 6); at rest by default.
+            length: what turns are counted with, m; `characteristic_length` by default.
+        """
+        shape, (poses, twists) = self._batch(pose=(pose, (4, 4)), twist=(twist, (6,)))
+        return Determinant(**_shaped(self._core.determinant(poses, twists, self._length(length)), shape))
+
+    def singularity(
+        self, pose: ArrayLike, *, length: float | None = None, tolerance: float = TOLERANCE
+    ) -> Singularity:
+        """Determinant, singular values, kind of singularity and uncontrolled twist at a pose [T24, T30-T33].
+
+        Also where a leg has no frame, and other answers have the status SINGULAR.
+
+        Args:
+            pose: (..., 4, 4).
+            length: what turns are counted with, m; `characteristic_length` by default.
+            tolerance: up to it a measure (a pure number) counts as zero; with `NEAR_SINGULAR`, 0.01, the kind
+                is that of a singularity nearby.
+
+        >>> import polypod as pp
+        >>> mech = pp.load("lu-3spu-2rpu-r")
+        >>> near = mech.singularity(mech.home, tolerance=0.01)
+        >>> pp.SingularityKind(near.kind).name, int(near.uncontrolled)
+        ('ACTUATION', 2)
+        >>> pp.SingularityKind(mech.singularity(mech.home).kind).name
+        'NONE'
+        """
+        if not tolerance >= 0.0:
+            raise PolypodError(f"tolerance is {tolerance!r}; must be zero or more")
+        shape, (poses,) = self._batch(pose=(pose, (4, 4)))
+        out = _shaped(self._core.singularity(poses, self._length(length), float(tolerance)), shape)
+        return Singularity(**out | {name: codes(out[name]) for name in ("kind", "leg", "uncontrolled")})
+
+    def singularity_distance(
+        self,
+        pose: ArrayLike,
+        set: str | None = None,
+        *,
+        coordinates: Sequence[str] | None = None,
+        length: float | None = None,
+        reach: float | None = None,
+    ) -> SingularityDistance:
+        """The nearest singular poses along each coordinate, the others kept, dependent ones following [T34].
+
+        Args:
+            pose: (..., 4, 4).
+            set: the coordinate set; `natural` by default, or `pose` for a mechanism without it.
+            coordinates: of the set `pose`, the `dof` coordinates to give; by default those that determine the
+                others best at the centre pose.
+            length: what turns are counted with, m; `characteristic_length` by default.
+            reach: how far lengths are followed, m; by default the longest leg at the centre pose. Angles are
+                followed for a full turn.
+
+        Raises:
+            CoordinateError: coordinates that make up no set of this mechanism.
+            UnknownNameError: no such set.
+
+        >>> import polypod as pp
+        >>> mech = pp.load("lu-3spu-2rpu-r")
+        >>> pose = mech.pose({"alpha": 0.1, "p": -0.3, "h": 0.62, "beta": 0.7, "gamma": 0.6})
+        >>> found = mech.singularity_distance(pose)
+        >>> dict(zip(found.coordinates, found.singular.round(3).tolist()))["beta"]
+        [-2.829, 2.823]
+        """
+        set = ("natural" if "natural" in self._sets else "pose") if set is None else set
+        if set not in self._sets:
+            raise UnknownNameError("coordinate set", set, self._sets)
+        named = None if coordinates is None else list(coordinates)
+        if named is not None and (
+            len({*named}) != self.dof or self._set_of(dict.fromkeys(named, 0.0)) != set
+        ):
+            raise CoordinateError(
+                f"coordinates {', '.join(named)} are not those of the set {set}: "
+                f"{', '.join(self.coordinate_sets[set])}, {self.dof} of them"
+            )
+        if reach is None:
+            reach = float(self.inverse_kinematics(self.home).lengths.max())
+        shape, (poses,) = self._batch(pose=(pose, (4, 4)))
+        names, table = self._core.nearest_singular(
+            poses, set, named, self._length(length), _positive("reach", reach)
+        )
+        out = _shaped(table, shape)
+        return SingularityDistance(
+            tuple(names),
+            out["value"],
+            out["singular"],
+            np.abs(out["singular"] - out["value"][..., None]),
+            codes(out["kind"]),
+            out["searched"],
+            out["status"],
+        )
+
+    def _length(self, length: float | None) -> float:
+        """The length that turns are counted with."""
+        return self.characteristic_length if length is None else _positive("length", length)
 
     # --- forward kinematics ------------------------------------------------------------------------------
 
@@ -413,7 +528,7 @@ class Mechanism:
             continued: start each state from the one before, in the order of the flattened batch, as along a
                 motion; the guess then serves the first.
 
-        The status is MODE_JUMP where the guess's mode ends on the way to these lengths: the pose is then one of
+        The status is MODE_JUMP where the guess's mode ends on the way to these lengths; the pose is then of
         another mode. It is NOT_CONVERGED where no pose was found, and SINGULAR where two modes meet and the
         pose is known to about 1e-7 only. Lengths that are negative or not finite give INVALID_INPUT.
 
@@ -438,7 +553,7 @@ class Mechanism:
         Args:
             lengths: (..., n), m; those of passive legs are not read.
 
-        The first call for a mechanism takes about a second: it finds all complex solutions for generic lengths.
+        The first call takes about a second: it finds all complex solutions for generic lengths.
 
         Raises:
             UnsupportedError: not as many actuated legs as freedoms, or singular by design.
@@ -624,6 +739,12 @@ def _plain(value: Any) -> Any:
         case list() | tuple():
             return [_plain(entry) for entry in value]
     return value
+
+
+def _positive(name: str, value: float) -> float:
+    if not 0.0 < value < np.inf:
+        raise PolypodError(f"{name} is {value!r}; must be a positive number of metres")
+    return float(value)
 
 
 def _from_parts(data: dict[str, Any], text: str | None) -> Mechanism:

@@ -36,6 +36,12 @@ class Solution:
 
     __hash__ = None  # type: ignore[assignment]
 
+    @property
+    def singularities(self) -> dict[str, Any]:
+        """Singular poses that the motion crosses, touches or comes near: see `polypod.passages`."""
+        findings: dict[str, Any] = json.loads(self.dataset.attrs["singularities"])
+        return findings
+
     def save(self, path: str | PathLike[str]) -> None:
         """Write a NetCDF 3 file (`.nc`) or a table (`.csv`: one row for each instant); both load back equal.
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from typing import Any
 
@@ -14,7 +15,9 @@ from polypod import _core
 from polypod.answers import State
 from polypod.mechanism import Mechanism
 from polypod.motion import Motion
+from polypod.passages import find_passages
 from polypod.results import Solution
+from polypod.singularity import Determinant
 from polypod.status import Status
 
 CHUNK = 20_000
@@ -78,6 +81,8 @@ VARIABLES: dict[str, tuple[tuple[str, ...], str, str, str]] = {
     "limit_margin": (_LIMIT, "m, rad, 1 or N", "", "slack of the limit, negative beyond it"),
     "limit_relative": (_LIMIT, "1", "", "slack of the limit relative to its scale"),
     "binding_limit": (_TIME, "1", "", "index of the limit with the least relative slack; -1 for none"),
+    "determinant": (_TIME, "1", "det J", "determinant of the Jacobian in pure numbers"),
+    "determinant_rate": (_TIME, "1/s", "(det J)'", "rate of the determinant"),
 }
 _LENGTHS = {"x", "y", "z", "p", "h", "tip_x", "tip_y", "tip_z"}
 _PURE = {"axis_x", "axis_y", "axis_z"}
@@ -100,6 +105,7 @@ def solve(mech: Mechanism, motion: Motion, *, progress: Callable[[int, int], Non
 
     Returns:
         A `Solution`, whose dataset has one variable for each quantity, SI, and the `Status` of every state.
+        Its `singularities` tell which singular poses the motion crosses or comes near, also between samples.
 
     >>> import polypod as pp
     >>> mech = pp.load("lu-3spu-2rpu-r")
@@ -125,7 +131,10 @@ def solve(mech: Mechanism, motion: Motion, *, progress: Callable[[int, int], Non
         values["actuator_work"][:known] = cumulative_simpson(
             power[:known], x=motion.time[:known], initial=0.0
         )
-    return Solution(_dataset(mech, motion, values))
+    determinant = Determinant(values["determinant"], values["determinant_rate"], values["status"])
+    passages = find_passages(mech, motion, state.pose, determinant)
+    dataset = _dataset(mech, motion, values)
+    return Solution(dataset.assign_attrs(singularities=json.dumps(passages, ensure_ascii=False)))
 
 
 def _solve_chunk(mech: Mechanism, motion: Motion, state: State, chunk: slice) -> dict[str, NDArray[Any]]:
@@ -139,7 +148,7 @@ def _solve_chunk(mech: Mechanism, motion: Motion, state: State, chunk: slice) ->
     load = (wrench, motion.wrench_axes)
     dynamics = mech.inverse_dynamics(pose, twist, acceleration, *load)
     power = mech.power(pose, twist, acceleration, *load)
-    conditioning = mech.conditioning(pose)
+    conditioning, determinant = mech.conditioning(pose), mech.determinant(pose, twist)
     limits = mech.limits(pose, *load, twist=twist, acceleration=acceleration)
     # The first thing that went wrong explains the rest.
     found = state.status[chunk]
@@ -181,6 +190,8 @@ def _solve_chunk(mech: Mechanism, motion: Motion, state: State, chunk: slice) ->
         "power_residual": power.residual,
         "sigma_min": conditioning.sigma_min,
         "condition": conditioning.condition,
+        "determinant": determinant.determinant,
+        "determinant_rate": determinant.rate,
         "status": status.astype(np.int8),
     }
     if limits.names:

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from polypod.answers import Mobility
 from polypod.mechanism import Mechanism
+from polypod.passages import warnings_of
 from polypod.results import Solution
 from polypod.status import Status, count
 
@@ -194,6 +195,7 @@ def summarise(mech: Mechanism, solution: Solution) -> dict[str, Any]:
             "sigma_min": _number(sigma[nearest]),
             "condition": _number(of("condition")[nearest]),
         },
+        "singularities": {**solution.singularities, "warnings": warnings_of(solution.singularities)},
         "power": _power(solution),
         "coupled": _coupled(solution),
         "limits": _limits(solution),

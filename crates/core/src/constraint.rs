@@ -230,10 +230,19 @@ pub fn row_size(row: &Wrench<f64>, scale: f64) -> f64 {
     (row.force.dot(row.force) + torque.dot(torque)).sqrt()
 }
 
+/// Rows smaller than this vanish: they give no direction and no distance.
+const VANISHING_ROW: f64 = 1e-6;
+
+/// What a row is divided by to make it one of size one; a row that vanishes stays as small as it is.
+#[must_use]
+pub fn row_unit(row: &Wrench<f64>, scale: f64) -> f64 {
+    row_size(row, scale).max(VANISHING_ROW)
+}
+
 /// How far the platform must move to satisfy the constraint, to first order, turns counted as arcs at `scale`, m.
 #[must_use]
 pub fn distance(c: &Constraint, pose: &Pose<f64>, scale: f64) -> f64 {
-    value(c, pose).abs() / row_size(&row(c, pose), scale)
+    value(c, pose).abs() / row_unit(&row(c, pose), scale)
 }
 
 /// The largest distance by which a pose misses an independent constraint, m.

@@ -452,6 +452,25 @@ fn solve_dependent(
     (Status::Ok, first.sign)
 }
 
+/// Which numbers of the set to give so that the constraints determine the others best at the home pose.
+#[must_use]
+pub fn best_given(mech: &Mechanism, set: &Set) -> Vec<bool> {
+    if let Some(given) = set.given(mech) {
+        return given;
+    }
+    let (count, wanted) = (set.names().len(), mech.independent.len());
+    let home = set.values(mech, &mech.home).map(Jet::lit);
+    let mut best = (-1.0, vec![true; count]);
+    for mask in (0..1_usize << count).filter(|mask| mask.count_ones() as usize == wanted) {
+        let dependent: Vec<usize> = (0..count).filter(|i| mask >> i & 1 == 1).collect();
+        let pivots = solve(gradient(mech, set, &home, &dependent), [0.0; MAX_CONSTRAINTS]).pivots;
+        if pivots > best.0 {
+            best = (pivots, (0..count).map(|i| mask >> i & 1 == 0).collect());
+        }
+    }
+    best.1
+}
+
 /// What one unit of a dependent coordinate's step is measured by: a length or a radian.
 fn reach(set: &Set, index: usize, scale: f64) -> f64 {
     match set {

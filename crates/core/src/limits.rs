@@ -169,7 +169,9 @@ impl Limit {
     #[must_use]
     pub fn margin(&self, mech: &Mechanism, pose: &Pose<f64>, forces: Option<&[f64; 6]>) -> f64 {
         self.bound.margin(match self.measure {
-            Measure::Conditioning => singularity::conditioning(mech, pose).sigma_min,
+            Measure::Conditioning => {
+                singularity::conditioning(mech, pose, mech.characteristic_length).sigma_min
+            }
             Measure::Force { row, .. } => forces.map_or(f64::NAN, |f| f[row]),
             _ => self.geometric(mech, pose).unwrap_or(f64::NAN),
         })

@@ -109,7 +109,7 @@ pub fn project(constraints: &[Constraint], size: f64, start: &Pose<f64>) -> Opti
     let mut pose = *start;
     for _ in 0..NEWTON_STEPS {
         let rows: Vec<Wrench<f64>> = constraints.iter().map(|c| constraint::row(c, &pose)).collect();
-        let sizes: Vec<f64> = rows.iter().map(|row| constraint::row_size(row, size)).collect();
+        let sizes: Vec<f64> = rows.iter().map(|row| constraint::row_unit(row, size)).collect();
         let residual = DVector::from_iterator(
             rows.len(),
             constraints.iter().zip(&sizes).map(|(c, s)| constraint::value(c, &pose) / s),
@@ -149,7 +149,7 @@ fn independent_rows(mech: &Mechanism, poses: &[Pose<f64>]) -> Vec<usize> {
     let size = mech.characteristic_length;
     let choose = |pose: &Pose<f64>| {
         let rows: Vec<Wrench<f64>> = mech.constraints.iter().map(|c| constraint::row(c, pose)).collect();
-        let sizes: Vec<f64> = rows.iter().map(|row| constraint::row_size(row, size)).collect();
+        let sizes: Vec<f64> = rows.iter().map(|row| constraint::row_unit(row, size)).collect();
         let all = scaled_rows(&rows, &sizes, size);
         let mut chosen: Vec<usize> = Vec::new();
         for i in 0..rows.len() {
@@ -185,7 +185,7 @@ fn uncontrolled(mech: &Mechanism, independent: &[Constraint], pose: &Pose<f64>) 
     let size = mech.characteristic_length;
     let legs = mech.actuated().map(|(_, leg)| leg::row(&leg::position(leg, pose)));
     let rows: Vec<Wrench<f64>> = legs.chain(independent.iter().map(|c| constraint::row(c, pose))).collect();
-    let sizes: Vec<f64> = rows.iter().map(|row| constraint::row_size(row, size)).collect();
+    let sizes: Vec<f64> = rows.iter().map(|row| constraint::row_unit(row, size)).collect();
     6 - rank_of(&scaled_rows(&rows, &sizes, size))
 }
 

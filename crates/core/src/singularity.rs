@@ -1,14 +1,76 @@
-//! How near a pose is to a singularity.
+//! What a pose has of a singularity: determinant, singular values, the kind, and the twist that nothing controls
+//! \[T24\] \[T30\]-\[T33\].
 
-use nalgebra::{DMatrix, Matrix6};
+use nalgebra::{DMatrix, RowDVector};
 
 use crate::constraint;
+use crate::jacobian::Matrix6;
 use crate::leg;
-use crate::mechanism::Mechanism;
-use crate::spatial::{Pose, Wrench};
+use crate::linear;
+use crate::mechanism::{Constraint, ConstraintKind, Mechanism};
+use crate::real::{Dual, Real};
+use crate::spatial::{Pose, Twist, Vec3, Wrench};
+
+/// A singular value, a row's size, a leg's length or its sine (all pure numbers) counts as zero up to this much: poses
+/// may miss their constraints by as much of the characteristic length.
+pub const TOLERANCE: f64 = 1e-6;
+
+/// What is singular about a pose, by the conditions of \[T32\]; the first that holds is the kind.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Kind {
+    None = 0,
+    LegLength = 1,
+    ConstraintVanishes = 2,
+    Constraint = 3,
+    LegFrame = 4,
+    Actuation = 5,
+    DependentRows = 6,
+}
+
+impl Kind {
+    pub const ALL: [Kind; 7] = [
+        Kind::None,
+        Kind::LegLength,
+        Kind::ConstraintVanishes,
+        Kind::Constraint,
+        Kind::LegFrame,
+        Kind::Actuation,
+        Kind::DependentRows,
+    ];
+
+    #[must_use]
+    pub fn message(self) -> &'static str {
+        match self {
+            Kind::None => "no singularity",
+            Kind::LegLength => {
+                "inverse singularity: a leg has no length, so it has no direction, and its actuator moves nothing"
+            }
+            Kind::ConstraintVanishes => {
+                "constraint singularity: the wrench of a constraint vanishes (c = τ = 0, as where L ∥ l and r ∥ L), and the \
+                 platform gains a freedom that no actuator controls"
+            }
+            Kind::Constraint => {
+                "constraint singularity: the legs' constraint wrenches depend on one another, and the platform gains a \
+                 freedom that no actuator controls"
+            }
+            Kind::LegFrame => {
+                "passive singularity: a leg lies along the axis of its universal joint or rod, so its turning about itself \
+                 is not determined"
+            }
+            Kind::Actuation => {
+                "direct singularity: with all actuators locked the platform can still move, and forces grow without limit"
+            }
+            Kind::DependentRows => {
+                "no singularity of the mechanism: the constraints that J holds depend on one another here, while redundant \
+                 ones that it leaves out hold the platform"
+            }
+        }
+    }
+}
 
 /// Singular values of the leg Jacobian on the twists that the constraints allow; turns are counted as arcs at the
-/// characteristic length, so that all entries are pure numbers \[T24\].
+/// given length, so that all entries are pure numbers \[T24\].
 #[derive(Clone, Copy, Debug)]
 pub struct Conditioning {
     pub sigma_min: f64,
@@ -17,37 +79,211 @@ pub struct Conditioning {
     pub condition: f64,
 }
 
-#[must_use]
-pub fn conditioning(mech: &Mechanism, pose: &Pose<f64>) -> Conditioning {
-    let scaled = |row: Wrench<f64>| (row.torque * (1.0 / mech.characteristic_length)).array();
-    let matrix = |rows: Vec<Wrench<f64>>| {
-        DMatrix::from_fn(
-            rows.len(),
-            6,
-            |i, j| {
-                if j < 3 { rows[i].array()[j] } else { scaled(rows[i])[j - 3] }
-            },
-        )
-    };
-    let legs = matrix(mech.actuated().map(|(_, leg)| leg::row(&leg::position(leg, pose))).collect());
-    let g = matrix(mech.independent.iter().map(|c| constraint::row(c, pose)).collect());
-    let none = Conditioning { sigma_min: f64::NAN, sigma_max: f64::NAN, condition: f64::NAN };
-    if legs.iter().chain(g.iter()).any(|e| !e.is_finite()) {
-        return none;
+/// All that [`singularity`] finds at a pose.
+#[derive(Clone, Debug)]
+pub struct Singularity {
+    pub determinant: f64,
+    pub conditioning: Conditioning,
+    /// The smallest singular value of the constraints' rows that generic poses have; infinite without constraints.
+    pub constraint_sigma: f64,
+    /// Length of each leg by the scale, and sine of the angle between it and the axis that its frame hangs on.
+    pub leg_length: Vec<f64>,
+    pub leg_sine: Vec<f64>,
+    pub kind: Kind,
+    /// The leg that the kind speaks of.
+    pub leg: Option<usize>,
+    /// How many freedoms the locked actuators leave.
+    pub uncontrolled: usize,
+    /// The allowed twist that the legs notice least, `|(v, Λω)| = 1`.
+    pub twist: Twist<f64>,
+    pub screw: Screw,
+}
+
+/// A twist as a turn about an axis and a slide along it \[T33\].
+#[derive(Clone, Copy, Debug)]
+pub struct Screw {
+    /// Unit direction, base axes.
+    pub axis: Vec3<f64>,
+    /// Slide by turn, m/rad; infinite for a pure translation.
+    pub pitch: f64,
+    /// The point of the axis that is nearest to o, base axes; o itself for a pure translation.
+    pub point: Vec3<f64>,
+}
+
+/// A constraint's row for the twist (v, Λω), of a constraint counted as a length, in pure numbers: `(c, τ/Λ)`, and
+/// `(0, τ)` for kind D \[T30\].
+#[inline(always)]
+fn constraint_row<T: Real>(c: &Constraint, pose: &Pose<T>, scale: f64) -> [T; 6] {
+    let row = constraint::row(c, pose);
+    pure_row(if c.kind == ConstraintKind::D { row * T::lit(scale) } else { row }, scale)
+}
+
+#[inline(always)]
+fn pure_row<T: Real>(row: Wrench<T>, scale: f64) -> [T; 6] {
+    Wrench::new(row.force, row.torque * T::lit(1.0 / scale)).array()
+}
+
+/// J in pure numbers for the length `scale`: its determinant says on which side of the singular poses a pose is \[T30\].
+#[inline(always)]
+pub fn pure_jacobian<T: Real>(mech: &Mechanism, pose: &Pose<T>, scale: f64) -> Matrix6<T> {
+    let mut rows = [[T::zero(); 6]; 6];
+    let legs = mech.actuated().map(|(_, leg)| pure_row(leg::row(&leg::position(leg, pose)), scale));
+    let constraints = mech.independent.iter().map(|c| constraint_row(c, pose, scale));
+    for (row, values) in rows.iter_mut().zip(legs.chain(constraints)) {
+        *row = values;
     }
-    // Twists that the constraints allow: what G's pseudo-inverse leaves.
-    let allowed = if g.nrows() == 0 {
-        DMatrix::identity(6, 6)
-    } else {
-        let Ok(inverse) = g.clone().pseudo_inverse(1e-12) else {
-            return none;
-        };
-        DMatrix::identity(6, 6) - inverse * g
-    };
-    let reduced = legs * allowed;
-    let square = Matrix6::from_fn(|i, j| if i < reduced.nrows() { reduced[(i, j)] } else { 0.0 });
-    let mut sigma: Vec<f64> = square.singular_values().iter().copied().collect();
-    sigma.sort_by(|a, b| b.total_cmp(a));
-    let (sigma_max, sigma_min) = (sigma[0], sigma[mech.dof() - 1]);
+    rows
+}
+
+/// What rounding leaves of a determinant that is zero, relative to the product of its rows' sizes.
+const DETERMINANT_ROUNDING: f64 = 4e-15;
+
+/// det J, zero within rounding, and its exact rate along a twist \[T30\].
+#[must_use]
+pub fn determinant(mech: &Mechanism, pose: &Pose<f64>, twist: &Twist<f64>, scale: f64) -> Dual<f64> {
+    let rows = pure_jacobian(mech, &pose.along(twist), scale);
+    let det = linear::determinant(&rows);
+    let size: f64 = rows.iter().map(|row| row.iter().map(|e| e.x * e.x).sum::<f64>().sqrt()).product();
+    if det.x.abs() <= DETERMINANT_ROUNDING * size { Dual::new(0.0, det.d) } else { det }
+}
+
+/// The smallest singular value of J in pure numbers; NaN where an actuated leg has no direction.
+#[must_use]
+pub fn smallest(mech: &Mechanism, pose: &Pose<f64>, scale: f64) -> f64 {
+    Svd::of(&pure_jacobian(mech, pose, scale)).values[5]
+}
+
+/// Singular values, largest first, at least six, and the right singular vectors of rows of six.
+struct Svd {
+    values: Vec<f64>,
+    vectors: DMatrix<f64>,
+}
+
+impl Svd {
+    fn of(rows: &[[f64; 6]]) -> Self {
+        let height = rows.len().max(6);
+        if rows.iter().flatten().any(|e| !e.is_finite()) {
+            return Svd { values: vec![f64::NAN; height], vectors: DMatrix::from_element(6, 6, f64::NAN) };
+        }
+        let m = DMatrix::from_fn(height, 6, |i, j| rows.get(i).map_or(0.0, |row| row[j]));
+        let svd = m.svd(false, true);
+        let vectors = svd.v_t.unwrap_or_else(|| DMatrix::from_element(6, 6, f64::NAN));
+        Svd { values: svd.singular_values.iter().copied().collect(), vectors }
+    }
+}
+
+/// The twists that the constraints allow at a pose, from all of their rows \[T31\].
+struct Allowed {
+    /// The singular value that is the smallest at generic poses to differ from zero.
+    sigma: f64,
+    /// Fewer independent rows than at generic poses.
+    lost: bool,
+    /// Orthonormal twists (v, Λω), one a row.
+    basis: DMatrix<f64>,
+}
+
+fn allowed(mech: &Mechanism, pose: &Pose<f64>, scale: f64, tolerance: f64) -> Allowed {
+    let rows: Vec<[f64; 6]> = mech.constraints.iter().map(|c| constraint_row(c, pose, scale)).collect();
+    let (svd, generic) = (Svd::of(&rows), 6 - mech.dof());
+    let rank = svd.values[..generic].iter().filter(|&&s| !(s <= tolerance)).count();
+    Allowed {
+        sigma: if generic == 0 { f64::INFINITY } else { svd.values[generic - 1] },
+        lost: rank < generic,
+        basis: svd.vectors.rows(rank, 6 - rank).into_owned(),
+    }
+}
+
+/// Singular values of the legs' rows on the allowed twists, largest first and as many as those, and the
+/// allowed twist of the smallest \[T24\] \[T31\].
+fn leg_values(mech: &Mechanism, pose: &Pose<f64>, scale: f64, allowed: &Allowed) -> (Vec<f64>, Twist<f64>) {
+    let freedoms = allowed.basis.nrows();
+    let has_direction = |leg: &leg::Position<f64>| leg.length > TOLERANCE * scale;
+    let legs: Vec<_> = mech.actuated().map(|(_, leg)| leg::position(leg, pose)).collect();
+    if !legs.iter().all(has_direction) || allowed.basis.iter().any(|e| !e.is_finite()) {
+        return (vec![f64::NAN; freedoms], Twist::from_array([f64::NAN; 6]));
+    }
+    let rows: Vec<[f64; 6]> = legs.iter().map(|p| pure_row(leg::row(p), scale)).collect();
+    let legs = DMatrix::from_fn(rows.len(), 6, |i, j| rows[i][j]);
+    // Where a constraint is lost there are fewer legs than freedoms: rows of zeros stand for the legs that lack.
+    let reduced = (legs * allowed.basis.transpose()).resize_vertically(freedoms, 0.0);
+    let svd = reduced.svd(false, true);
+    let least = svd.v_t.map_or_else(|| RowDVector::zeros(freedoms), |v| v.row(freedoms - 1).into_owned());
+    let twist = least * &allowed.basis;
+    // One of two opposite twists: the one whose largest entry is positive.
+    let sign = twist.iter().fold(0.0_f64, |m, &e| if e.abs() > m.abs() { e } else { m }).signum();
+    let entry = |i: usize| sign * twist[i] / if i < 3 { 1.0 } else { scale };
+    (svd.singular_values.iter().copied().collect(), Twist::from_array(std::array::from_fn(entry)))
+}
+
+/// The singular values at a pose \[T24\]; NaN where an actuated leg has no direction.
+#[must_use]
+pub fn conditioning(mech: &Mechanism, pose: &Pose<f64>, scale: f64) -> Conditioning {
+    values_of(&leg_values(mech, pose, scale, &allowed(mech, pose, scale, TOLERANCE)).0)
+}
+
+fn values_of(sigma: &[f64]) -> Conditioning {
+    let (sigma_max, sigma_min) = (sigma[0], sigma[sigma.len() - 1]);
     Conditioning { sigma_min, sigma_max, condition: sigma_max / sigma_min }
+}
+
+/// Everything about a pose's nearness to a singularity, turns counted as arcs at `scale`; a measure up to `tolerance`
+/// counts as zero \[T30\]-\[T33\].
+#[must_use]
+pub fn singularity(mech: &Mechanism, pose: &Pose<f64>, scale: f64, tolerance: f64) -> Singularity {
+    let positions: Vec<_> = mech.legs.iter().map(|leg| leg::position(leg, pose)).collect();
+    let leg_length: Vec<f64> = positions.iter().map(|p| p.length / scale).collect();
+    let leg_sine: Vec<f64> =
+        mech.legs.iter().zip(&positions).map(|(leg, p)| leg::frame(leg, pose, p).sine).collect();
+    let allowed = allowed(mech, pose, scale, tolerance);
+    let (sigma, twist) = leg_values(mech, pose, scale, &allowed);
+    let conditioning = values_of(&sigma);
+    let known = conditioning.sigma_min.is_finite();
+
+    let first_zero = |values: &[f64], limit: f64| values.iter().position(|&x| x <= limit);
+    let row_size = |c: &Constraint| constraint_row(c, pose, scale).iter().map(|e| e * e).sum::<f64>().sqrt();
+    let vanishing = mech.constraints.iter().find(|c| row_size(c) <= tolerance);
+    let (kind, leg) = if let Some(leg) = first_zero(&leg_length, tolerance.max(TOLERANCE)) {
+        (Kind::LegLength, Some(leg))
+    } else if let (true, Some(c)) = (allowed.lost, vanishing) {
+        (Kind::ConstraintVanishes, Some(c.leg))
+    } else if allowed.lost {
+        (Kind::Constraint, None)
+    } else if let Some(leg) = first_zero(&leg_sine, tolerance) {
+        (Kind::LegFrame, Some(leg))
+    } else if conditioning.sigma_min <= tolerance {
+        (Kind::Actuation, None)
+    } else if smallest_of_chosen(mech, pose, scale) <= tolerance {
+        (Kind::DependentRows, None)
+    } else {
+        (Kind::None, None)
+    };
+    Singularity {
+        determinant: if known { determinant(mech, pose, &Twist::zero(), scale).x } else { f64::NAN },
+        conditioning,
+        constraint_sigma: allowed.sigma,
+        leg_length,
+        leg_sine,
+        kind,
+        leg,
+        uncontrolled: sigma.iter().filter(|&&s| s <= tolerance).count(),
+        twist,
+        screw: screw(pose.o, &twist, scale),
+    }
+}
+
+/// The smallest singular value of the constraints' rows in J; infinite without any.
+fn smallest_of_chosen(mech: &Mechanism, pose: &Pose<f64>, scale: f64) -> f64 {
+    let rows: Vec<[f64; 6]> = mech.independent.iter().map(|c| constraint_row(c, pose, scale)).collect();
+    if rows.is_empty() { f64::INFINITY } else { Svd::of(&rows).values[rows.len() - 1] }
+}
+
+/// The screw of a twist of o \[T33\].
+#[must_use]
+pub fn screw(o: Vec3<f64>, twist: &Twist<f64>, scale: f64) -> Screw {
+    let Twist { v, omega } = *twist;
+    let square = omega.dot(omega);
+    if scale * omega.norm() <= TOLERANCE * v.norm() {
+        return Screw { axis: v.unit(), pitch: f64::INFINITY, point: o };
+    }
+    Screw { axis: omega.unit(), pitch: v.dot(omega) / square, point: o + omega.cross(v) * (1.0 / square) }
 }

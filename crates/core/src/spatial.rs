@@ -7,7 +7,7 @@ use std::ops::{Add, Mul, Neg, Sub};
 
 use serde::{Deserialize, Serialize};
 
-use crate::real::Real;
+use crate::real::{Dual, Real};
 
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(from = "[T; 3]", into = "[T; 3]")]
@@ -305,6 +305,20 @@ impl<T: Real> Pose<T> {
     #[inline(always)]
     pub fn lift(p: &Pose<f64>) -> Self {
         Pose { rotation: Mat3::lift(p.rotation), o: Vec3::lift(p.o) }
+    }
+}
+
+impl Pose<f64> {
+    /// The pose with its rate along a twist.
+    #[must_use]
+    pub fn along(&self, twist: &Twist<f64>) -> Pose<Dual<f64>> {
+        let dual = |x: Vec3<f64>, d: Vec3<f64>| {
+            Vec3::new(Dual::new(x.x, d.x), Dual::new(x.y, d.y), Dual::new(x.z, d.z))
+        };
+        Pose {
+            rotation: Mat3(self.rotation.0.map(|c| dual(c, twist.omega.cross(c)))),
+            o: dual(self.o, twist.v),
+        }
     }
 }
 

@@ -14,6 +14,9 @@ use polypod_core::coordinates::Set;
 use polypod_core::limits::Limit;
 use polypod_core::mechanism::Mechanism;
 use polypod_core::modes::{self, Start};
+use polypod_core::nearest::Search;
+use polypod_core::roots::{self, Node, Precision};
+use polypod_core::singularity::Kind;
 use polypod_core::spec::{Axes, Fault, Spec};
 use polypod_core::status::Status;
 use pyo3::exceptions::{PyKeyError, PyValueError};
@@ -214,10 +217,59 @@ impl PyMechanism {
         arrays(py, table)
     }
 
-    fn conditioning<'py>(&self, py: Python<'py>, poses: Array<'py>) -> PyResult<Bound<'py, PyDict>> {
+    fn conditioning<'py>(
+        &self,
+        py: Python<'py>,
+        poses: Array<'py>,
+        length: f64,
+    ) -> PyResult<Bound<'py, PyDict>> {
         let poses = slice(&poses)?;
-        let table = py.detach(|| batch::conditioning(&self.0, poses));
+        let table = py.detach(|| batch::conditioning(&self.0, poses, length));
         arrays(py, table)
+    }
+
+    fn determinant<'py>(
+        &self,
+        py: Python<'py>,
+        poses: Array<'py>,
+        twists: Array<'py>,
+        length: f64,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        let (poses, twists) = (slice(&poses)?, slice(&twists)?);
+        expect(twists, 6, poses)?;
+        let table = py.detach(|| batch::determinants(&self.0, poses, twists, length));
+        arrays(py, table)
+    }
+
+    fn singularity<'py>(
+        &self,
+        py: Python<'py>,
+        poses: Array<'py>,
+        length: f64,
+        tolerance: f64,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        let poses = slice(&poses)?;
+        let table = py.detach(|| batch::singularities(&self.0, poses, length, tolerance));
+        arrays(py, table)
+    }
+
+    /// Names of the coordinates that are searched, and their arrays.
+    #[pyo3(signature = (poses, set, names, length, reach))]
+    fn nearest_singular<'py>(
+        &self,
+        py: Python<'py>,
+        poses: Array<'py>,
+        set: &str,
+        names: Option<Vec<String>>,
+        length: f64,
+        reach: f64,
+    ) -> PyResult<(Vec<&'static str>, Bound<'py, PyDict>)> {
+        let (set, poses) = (self.set(set)?, slice(&poses)?);
+        let given = batch::searched_coordinates(&self.0, &set, names.as_deref());
+        let searched = set.names().iter().zip(&given).filter(|(_, g)| **g).map(|(name, _)| *name).collect();
+        let search = Search { set, given, reach, scale: length };
+        let table = py.detach(|| batch::nearest_singular(&self.0, poses, &search));
+        Ok((searched, arrays(py, table)?))
     }
 
     fn kinematics<'py>(
@@ -377,6 +429,45 @@ fn states<'a>(
     Ok(States { poses, twists, accelerations })
 }
 
+/// Time and whether it is a crossing (else a near miss) of each zero of a function that is known with its rate.
+#[pyfunction]
+fn zeros<'py>(
+    time: Array<'py>,
+    values: Array<'py>,
+    rates: Array<'py>,
+    resolution: f64,
+) -> PyResult<Vec<(f64, bool)>> {
+    let nodes = nodes(&time, &values, &rates)?;
+    Ok(roots::events(&nodes, resolution).into_iter().map(|(t, e)| (t, e == roots::Event::Crossing)).collect())
+}
+
+/// Times at which such a function must be known next, none once its zeros are found to the precision of crossings,
+/// of near misses, and of zeros apart.
+#[pyfunction]
+fn unsettled_zeros<'py>(
+    time: Array<'py>,
+    values: Array<'py>,
+    rates: Array<'py>,
+    precision: [f64; 3],
+) -> PyResult<Vec<f64>> {
+    let [crossing, dip, resolution] = precision;
+    Ok(roots::unsettled(&nodes(&time, &values, &rates)?, &Precision { crossing, dip, resolution }))
+}
+
+fn nodes(time: &Array<'_>, values: &Array<'_>, rates: &Array<'_>) -> PyResult<Vec<Node>> {
+    let (time, values, rates) = (slice(time)?, slice(values)?, slice(rates)?);
+    if time.len() != values.len() || time.len() != rates.len() {
+        return Err(PyValueError::new_err("needs one value and one rate for each time"));
+    }
+    Ok(time.iter().zip(values).zip(rates).map(|((&t, &f), &d)| Node { t, f, d }).collect())
+}
+
+/// Code, name and message of every kind of singularity.
+#[pyfunction]
+fn singularity_kinds() -> Vec<(u8, String, &'static str)> {
+    Kind::ALL.iter().map(|&k| (k as u8, format!("{k:?}"), k.message())).collect()
+}
+
 /// Code and message of every status.
 #[pyfunction]
 fn statuses() -> Vec<(u8, String, &'static str)> {
@@ -390,5 +481,8 @@ fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_class::<PyMechanism>()?;
     m.add_class::<workspace::PyFlood>()?;
     m.add_class::<workspace::PyLattice>()?;
+    m.add_function(wrap_pyfunction!(zeros, m)?)?;
+    m.add_function(wrap_pyfunction!(unsettled_zeros, m)?)?;
+    m.add_function(wrap_pyfunction!(singularity_kinds, m)?)?;
     m.add_function(wrap_pyfunction!(statuses, m)?)
 }

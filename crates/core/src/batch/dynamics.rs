@@ -7,7 +7,7 @@ use crate::leg;
 use crate::mechanism::Mechanism;
 use crate::mobility;
 use crate::real::Dual;
-use crate::spatial::{Mat3, Motion, Pose, Twist, Vec3, Wrench};
+use crate::spatial::{Motion, Pose, Twist, Vec3, Wrench};
 use crate::spec::Axes;
 use crate::status::Status;
 
@@ -143,8 +143,7 @@ fn energy_along(mech: &Mechanism, platform: &Motion<f64>) -> (Dual<f64>, Dual<f6
     let Motion { pose, twist, acceleration } = platform;
     let dual =
         |x: Vec3<f64>, d: Vec3<f64>| Vec3::new(Dual::new(x.x, d.x), Dual::new(x.y, d.y), Dual::new(x.z, d.z));
-    let rotation = Mat3(pose.rotation.0.map(|c| dual(c, twist.omega.cross(c))));
-    let moving = Pose { rotation, o: dual(pose.o, twist.v) };
+    let moving = pose.along(twist);
     let twist = Twist::new(dual(twist.v, acceleration.a), dual(twist.omega, acceleration.eps));
     dynamics::energy(mech, &moving, &twist)
 }

@@ -9,7 +9,6 @@ use crate::jacobian;
 use crate::joints::{self, Zero};
 use crate::leg;
 use crate::mechanism::Mechanism;
-use crate::singularity;
 use crate::spatial::Twist;
 use crate::status::Status;
 
@@ -191,24 +190,6 @@ pub fn platform_acceleration(
             }
         }
         table.status[i] = status;
-    }
-    table
-}
-
-/// Singular values of the leg Jacobian on the twists that the constraints allow \[T24\].
-#[must_use]
-pub fn conditioning(mech: &Mechanism, poses: &[f64]) -> Table {
-    let n = poses.len() / 16;
-    let (mut table, ids) = Table::new(n, ["sigma_min", "sigma_max", "condition"].map(|name| (name, vec![])));
-    for i in 0..n {
-        let (pose, status) = read_pose(mech, poses, i);
-        table.status[i] = status;
-        if status == Status::Ok {
-            let c = singularity::conditioning(mech, &pose);
-            for (id, value) in ids.iter().zip([c.sigma_min, c.sigma_max, c.condition]) {
-                table.set(*id, i, 0, &[value]);
-            }
-        }
     }
     table
 }

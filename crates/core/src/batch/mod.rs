@@ -6,14 +6,16 @@ mod dynamics;
 mod forward;
 mod kinematics;
 mod limits;
+mod singularity;
 
 pub use checks::CONSTRAINT_TOLERANCE;
 pub use coordinates::{Coordinates, coordinate_values, states};
 pub use dynamics::{Loads, coupled_forces, inverse_dynamics, power};
 pub use forward::{AllModes, assembly_modes, forward_kinematics};
 pub use kinematics::{
-    conditioning, hessians, inverse_kinematics, jacobians, kinematics, platform_acceleration, platform_twist,
+    hessians, inverse_kinematics, jacobians, kinematics, platform_acceleration, platform_twist,
 };
+pub use singularity::{conditioning, determinants, nearest_singular, searched_coordinates, singularities};
 
 pub use limits::limits;
 

@@ -1,0 +1,127 @@
+"""Kinds of singularities, and what is found of them at poses."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from polypod import _core
+
+Array = NDArray[np.float64]
+Codes = NDArray[np.uint8]
+Kinds = NDArray[np.int8]
+
+TOLERANCE = 1e-6
+"""A measure of nearness (a pure number) up to which a pose is singular: poses are as exact as that."""
+
+NEAR_SINGULAR = 0.01
+"""Smallest singular value (a pure number) below which a pose is called nearly singular."""
+
+
+class SingularityKind(IntEnum):
+    """What is singular about a pose: the first of these conditions that holds [T32]."""
+
+    UNKNOWN = -1
+    """There is no answer: `status` says why."""
+    NONE = 0
+    LEG_LENGTH = 1
+    """A leg has no length: an inverse singularity, the paper's fourth."""
+    CONSTRAINT_VANISHES = 2
+    """The wrench of a constraint vanishes, as where L ∥ l and r ∥ L: the paper's first."""
+    CONSTRAINT = 3
+    """The constraint wrenches depend on one another: a freedom more, that no actuator controls."""
+    LEG_FRAME = 4
+    """A leg lies along the axis of its universal joint or rod: its turning about itself is undetermined."""
+    ACTUATION = 5
+    """With all actuators locked the platform can still move: a direct singularity."""
+    DEPENDENT_ROWS = 6
+    """Only the constraints that J holds depend on one another: J is singular, the mechanism is not."""
+
+    @property
+    def message(self) -> str:
+        """What it means."""
+        return _MESSAGES.get(self, "no answer; the status says why")
+
+
+_MESSAGES = {code: message for code, _, message in _core.singularity_kinds()}
+
+
+class Singularity(NamedTuple):
+    """How near poses are to singularities, and to which kind [T24, T30-T33]; base axes.
+
+    Where a leg has no direction (LEG_LENGTH) the status is SINGULAR, and only the kind, its leg, and the
+    measures of legs and constraints stand. Elsewhere singular poses have the status OK: the question has its
+    answer.
+    """
+
+    determinant: Array
+    """(...): det J in pure numbers; its sign tells the aspect, the side of the singular poses."""
+    sigma_min: Array
+    """(...): smallest singular value of the legs' rows on the twists that the constraints allow, 1."""
+    sigma_max: Array
+    """(...): the largest, 1."""
+    condition: Array
+    """(...): sigma_max / sigma_min."""
+    constraint_sigma: Array
+    """(...): smallest singular value of the constraints' rows, 1; inf without constraints."""
+    leg_length: Array
+    """(..., n): lengths of the legs by the characteristic length, 1."""
+    leg_sine: Array
+    """(..., n): sine of the angle between leg and axis of its universal joint or rod; about 1 for others."""
+    kind: Kinds
+    """(...): `SingularityKind`."""
+    leg: Kinds
+    """(...): index of the leg that the kind speaks of; -1 where it speaks of none."""
+    uncontrolled: Kinds
+    """(...): freedoms that the locked actuators leave; -1 where not known."""
+    twist: Array
+    """(..., 6): the allowed twist at o that the legs notice least; (v, Λω) has the length 1 m/s.
+
+    No leg notices it where `uncontrolled` is not 0; it is one of several where that exceeds 1.
+    """
+    axis: Array
+    """(..., 3): direction of that twist's axis; of its translation where the pitch is infinite."""
+    pitch: Array
+    """(...): slide by turn, m/rad; inf for a pure translation."""
+    point: Array
+    """(..., 3): the axis's point nearest to o, m; o for a pure translation."""
+    status: Codes
+
+
+class Determinant(NamedTuple):
+    """det J in pure numbers along a motion [T30]."""
+
+    determinant: Array
+    """(...)."""
+    rate: Array
+    """(...): exact rate along the twist, 1/s."""
+    status: Codes
+
+
+class SingularityDistance(NamedTuple):
+    """How far each coordinate goes, the others kept, until det J is zero [T34]; m and rad."""
+
+    coordinates: tuple[str, ...]
+    """Names of the k coordinates."""
+    value: Array
+    """(..., k): their values at the pose."""
+    singular: Array
+    """(..., k, 2): the nearest singular value below and above; -inf and inf where there is none in reach."""
+    distance: Array
+    """(..., k, 2): |singular - value|."""
+    kind: Kinds
+    """(..., k, 2): `SingularityKind` there; NONE where there is none in reach.
+
+    UNKNOWN where det J changes its sign, but no singular pose is known.
+    """
+    searched: Array
+    """(..., k, 2): value up to which poses were looked at: the reach, or where poses end."""
+    status: Codes
+
+
+def codes(values: Array) -> Kinds:
+    """Small integers from the core's numbers, -1 for NaN."""
+    return np.where(np.isfinite(values), values, -1).astype(np.int8)
