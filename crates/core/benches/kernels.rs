@@ -8,7 +8,7 @@ use std::hint::black_box;
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use polypod_core::real::{Dual, Real};
 use polypod_core::spatial::{Acceleration, Motion, Pose, Twist, Vec3, Wrench};
-use polypod_core::{dynamics, jacobian, leg};
+use polypod_core::{dynamics, forward, jacobian, leg};
 
 /// Different states in turn, so that nothing is learnt from the last one.
 const STATES: usize = 64;
@@ -46,6 +46,11 @@ fn kernels(criterion: &mut Criterion) {
     });
     measure("inverse dynamics", &|s| {
         black_box(dynamics::inverse_dynamics(&mech, s, mech.load.wrench));
+    });
+    measure("forward kinematics from a guess 1 mm off", &|s| {
+        let mut lengths: Vec<f64> = mech.legs.iter().map(|leg| leg::position(leg, &s.pose).length).collect();
+        lengths[0] += 1e-3;
+        black_box(forward::forward_kinematics(&mech, &lengths, &s.pose));
     });
     measure("inverse dynamics and one derivative", &|s| {
         let platform = lifted::<Dual<f64>>(s);

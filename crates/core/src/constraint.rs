@@ -126,13 +126,13 @@ struct Vectors<T> {
 
 #[inline(always)]
 fn vectors<T: Real>(c: &Constraint, pose: &Pose<T>) -> Vectors<T> {
-    let e = pose.rotation * Vec3::lift(c.platform_point);
-    let e1 = pose.rotation * Vec3::lift(c.partner.platform_point);
+    let e = pose.rotation.of(c.platform_point);
+    let e1 = pose.rotation.of(c.partner.platform_point);
     Vectors {
         e,
         r: pose.o + e - Vec3::lift(c.base_point),
         base: Vec3::lift(c.base_axis),
-        platform: pose.rotation * Vec3::lift(c.platform_axis),
+        platform: pose.rotation.of(c.platform_axis),
         e1,
         r1: Mat3::lift(c.partner.turn) * (pose.o + e1 - Vec3::lift(c.partner.base_point)),
     }

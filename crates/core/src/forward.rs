@@ -54,21 +54,20 @@ pub struct System<T> {
 #[inline(always)]
 pub fn system<T: Real>(mech: &Mechanism, pose: &Pose<T>, squares: &[T; 6]) -> System<T> {
     let scale = mech.characteristic_length;
-    let square = T::lit(1.0 / (scale * scale));
-    let half = T::lit(0.5);
+    let square = 1.0 / (scale * scale);
     let mut residual = [T::zero(); 6];
     let mut matrix = [[T::zero(); 6]; 6];
     let legs = mech.actuated().zip(squares).map(|((_, leg), &length_square)| {
         let (e, r) = leg::vectors(leg, pose);
-        ((r.dot(r) - length_square) * half * square, Wrench::at(e, r), square)
+        ((r.dot(r) - length_square).scale(0.5 * square), Wrench::at(e, r), square)
     });
     let constraints = mech.independent.iter().map(|c| {
-        let unit = T::lit(1.0 / constraint::unit(c, scale));
-        (constraint::value(c, pose) * unit, constraint::row(c, pose), unit)
+        let unit = 1.0 / constraint::unit(c, scale);
+        (constraint::value(c, pose).scale(unit), constraint::row(c, pose), unit)
     });
     for (i, (value, Wrench { force, torque }, unit)) in legs.chain(constraints).enumerate() {
         residual[i] = value;
-        let (a, b) = (force * (unit * T::lit(scale)), torque * unit);
+        let (a, b) = (force.map(|x| x.scale(unit * scale)), torque.map(|x| x.scale(unit)));
         matrix[i] = [a.x, a.y, a.z, b.x, b.y, b.z];
     }
     System { residual, matrix }

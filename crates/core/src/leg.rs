@@ -20,7 +20,7 @@ pub struct Position<T> {
 /// e from o to b and r from B to b.
 #[inline(always)]
 pub fn vectors<T: Real>(leg: &Leg, pose: &Pose<T>) -> (Vec3<T>, Vec3<T>) {
-    let e = pose.rotation * Vec3::lift(leg.platform.point);
+    let e = pose.rotation.of(leg.platform.point);
     (e, pose.o + e - Vec3::lift(leg.base.point))
 }
 

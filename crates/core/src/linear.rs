@@ -17,6 +17,7 @@ pub struct Solved<T, const N: usize> {
 #[inline(always)]
 pub fn solve<T: Real, const N: usize>(mut m: [[T; N]; N], mut rhs: [T; N]) -> Solved<T, N> {
     let mut sign = 1.0_f64;
+    let mut inverses = [T::zero(); N];
     for k in 0..N {
         // Bubble the largest entry of column k up to the diagonal.
         for i in k + 1..N {
@@ -31,9 +32,9 @@ pub fn solve<T: Real, const N: usize>(mut m: [[T; N]; N], mut rhs: [T; N]) -> So
             rhs[k] = T::select(larger, b, a);
             rhs[i] = T::select(larger, a, b);
         }
-        let inverse = T::one() / m[k][k];
+        inverses[k] = T::one() / m[k][k];
         for i in k + 1..N {
-            let factor = -(m[i][k] * inverse);
+            let factor = -(m[i][k] * inverses[k]);
             for j in k + 1..N {
                 m[i][j] = factor.mul_add(m[k][j], m[i][j]);
             }
@@ -46,7 +47,7 @@ pub fn solve<T: Real, const N: usize>(mut m: [[T; N]; N], mut rhs: [T; N]) -> So
         for j in k + 1..N {
             sum = (-m[k][j]).mul_add(rhs[j], sum);
         }
-        rhs[k] = sum / m[k][k];
+        rhs[k] = sum * inverses[k];
         let pivot = m[k][k].value();
         sign *= pivot.signum();
         pivots = (pivots.0.min(pivot.abs()), pivots.1.max(pivot.abs()));

@@ -19,7 +19,7 @@ type C = Complex<f64>;
 
 /// Error of a predicted step that a path is followed with, as a pure number; the later ones where paths came too close
 /// to each other.
-const PRECISIONS: [f64; 3] = [3e-3, 1e-4, 1e-6];
+const PRECISIONS: [f64; 3] = [3e-2, 1e-4, 1e-6];
 
 /// Precision of the search for the generic solutions, which is made once.
 const CLOSE: f64 = 1e-4;
@@ -29,6 +29,9 @@ const INFINITE: f64 = 1e5;
 
 /// The same for a path that cannot be followed further in double precision.
 const FAR: f64 = 300.0;
+
+/// Share of a path that is tried first.
+const FIRST_STEP: f64 = 0.3;
 
 /// Share of a path below which a step is not made shorter.
 const SMALLEST_STEP: f64 = 1e-13;
@@ -345,7 +348,7 @@ impl Path<'_> {
     fn follow(&self, start: &Pose<C>) -> End {
         let scale = self.mech.characteristic_length;
         let far = |pose: &Pose<C>| (modulus(pose.o) / scale).max(modulus(pose.rotation.0[0]));
-        let (mut pose, mut t, mut h) = (*start, 0.0_f64, 0.1_f64);
+        let (mut pose, mut t, mut h) = (*start, 0.0_f64, FIRST_STEP);
         // Before a singular end the path bends like a square root: steps shrink with what is left.
         while t < 1.0 && h > SMALLEST_STEP {
             h = h.min(1.0 - t);

@@ -28,6 +28,13 @@ pub trait Real:
     #[must_use]
     fn sqrt(self) -> Self;
 
+    /// `self * x` for a constant, which needs fewer operations where the number has parts.
+    #[must_use]
+    #[inline(always)]
+    fn scale(self, x: f64) -> Self {
+        self * Self::lit(x)
+    }
+
     /// `self * a + b`, fused where the number says so.
     #[must_use]
     #[inline(always)]
@@ -200,6 +207,10 @@ impl<T: Real> Real for Dual<T> {
         Dual::new(T::lit(x), T::zero())
     }
     #[inline(always)]
+    fn scale(self, x: f64) -> Self {
+        Dual::new(self.x.scale(x), self.d.scale(x))
+    }
+    #[inline(always)]
     fn value(self) -> f64 {
         self.x.value()
     }
@@ -342,6 +353,10 @@ impl Real for nalgebra::Complex<f64> {
     #[inline(always)]
     fn lit(x: f64) -> Self {
         nalgebra::Complex::new(x, 0.0)
+    }
+    #[inline(always)]
+    fn scale(self, x: f64) -> Self {
+        nalgebra::Complex::new(self.re * x, self.im * x)
     }
     #[inline(always)]
     fn value(self) -> f64 {

@@ -217,6 +217,15 @@ impl<T: Real> Mat3<T> {
 }
 
 impl<T: Real> Mat3<T> {
+    /// `M a` for a constant vector.
+    #[must_use]
+    #[inline(always)]
+    pub fn of(self, a: Vec3<f64>) -> Vec3<T> {
+        let [x, y, z] = self.0;
+        let term = |c: Vec3<T>, a: f64| c.map(|e| e.scale(a));
+        term(x, a.x) + term(y, a.y) + term(z, a.z)
+    }
+
     /// The Cayley map `(1 - ŵ/2)⁻¹ (1 + ŵ/2)`, a rotation by 2 atan(|w|/2) about w \[T26\].
     #[must_use]
     #[inline(always)]

@@ -22,8 +22,8 @@ pub struct Grid {
 /// The six neighbours of a node.
 const DIRECTIONS: [[i64; 3]; 6] = [[-1, 0, 0], [1, 0, 0], [0, -1, 0], [0, 1, 0], [0, 0, -1], [0, 0, 1]];
 
-/// Pieces of the way between two nodes at whose ends the sign of det J is compared.
-const PIECES: u32 = 4;
+/// Pieces of the way between two nodes.
+const PIECES: u32 = 5;
 
 /// How exactly the boundary is found on an edge, m.
 const EXACT: f64 = 1e-12;
@@ -168,7 +168,7 @@ impl Flood {
         let nearest = nearest_limit(mech, &pose);
         let beyond = || fit(mech, &pose, inner + way * high);
         let stop = match (nearest, self.sign) {
-            _ if high >= 1.0 && low >= 1.0 - EXACT / self.grid.step => Stop::Grid,
+            _ if high >= 1.0 && self.grid.node(self.grid.neighbour(node, direction)).is_none() => Stop::Grid,
             (Some((limit, margin)), _) if margin <= AT_LIMIT => Stop::Limit(limit),
             (_, Some(kept)) if beyond().is_none_or(|p| sign(mech, &p) != kept) => Stop::Singularity,
             _ => Stop::Search,
@@ -204,15 +204,20 @@ pub enum Stop {
     Search,
 }
 
-/// A pose at `o` from one nearby, if there is one; with the sign of det J kept on the way, if it is given.
+/// A pose at `o` from one nearby, if there is one, at once or in pieces; with the sign of det J kept at the end of each
+/// piece, if it is given.
 fn moved(mech: &Mechanism, pose: &Pose<f64>, o: Vec3<f64>, kept: Option<f64>) -> Option<Pose<f64>> {
-    let Some(kept) = kept else { return fit(mech, pose, o) };
-    let (from, mut pose) = (pose.o, *pose);
-    for k in 1..=PIECES {
-        let t = f64::from(k) / f64::from(PIECES);
-        pose = fit(mech, &pose, from * (1.0 - t) + o * t).filter(|p| sign(mech, p) == kept)?;
-    }
-    Some(pose)
+    let in_pieces = || {
+        let (from, mut pose) = (pose.o, *pose);
+        for k in 1..=PIECES {
+            let t = f64::from(k) / f64::from(PIECES);
+            let place = if k < PIECES { from * (1.0 - t) + o * t } else { o };
+            pose = fit(mech, &pose, place).filter(|p| kept.is_none_or(|kept| sign(mech, p) == kept))?;
+        }
+        Some(pose)
+    };
+    let at_once = if kept.is_none() { fit(mech, pose, o) } else { None };
+    at_once.or_else(in_pieces)
 }
 
 fn sign(mech: &Mechanism, pose: &Pose<f64>) -> f64 {

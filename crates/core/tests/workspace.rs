@@ -1,0 +1,144 @@
+//! The two ways to the reachable workspace, each against what defines it, and against each other.
+
+mod common;
+
+use common::{published, with_leg};
+use polypod_core::constraint::largest_distance;
+use polypod_core::coordinates::Set;
+use polypod_core::lattice::Lattice;
+use polypod_core::leg;
+use polypod_core::mechanism::Mechanism;
+use polypod_core::reach::fit;
+use polypod_core::singularity::conditioning;
+use polypod_core::spatial::{Pose, Vec3};
+use polypod_core::workspace::{Edge, Flood, Grid, Stop};
+
+/// A pose of the published manipulator away from its singularities.
+fn tilted(mech: &Mechanism) -> Pose<f64> {
+    Set::of(mech)[1].pose(mech, &[0.0, 0.0, 0.74, 0.3, 0.1, 0.0, 0.0])
+}
+
+fn grid(step: f64) -> Grid {
+    let side = (1.6 / step).round() as usize + 1;
+    Grid { origin: Vec3::new(-0.8, -0.8, 0.1), step, counts: [side, side, (0.9 / step).round() as usize] }
+}
+
+fn flooded(mech: &Mechanism, start: &Pose<f64>, step: f64, keep_aspect: bool) -> Flood {
+    let mut flood = Flood::new(mech, grid(step), start, keep_aspect).expect("a start inside");
+    while flood.wave(mech) > 0 {}
+    flood
+}
+
+/// Every leg within its stroke and every constraint kept, from positions alone.
+fn assert_inside(mech: &Mechanism, pose: &Pose<f64>) {
+    assert!(pose.rotation.rotation_error() < 1e-12);
+    assert!(largest_distance(mech, pose) < 1e-12);
+    for leg in &mech.legs {
+        let length = leg::position(leg, pose).length;
+        assert!((0.65 - 1e-9..=0.85 + 1e-9).contains(&length), "{length}");
+    }
+}
+
+#[test]
+fn a_fitted_pose_is_there_and_inside_and_no_farther_turned_than_it_must_be() {
+    let mech = published();
+    let start = tilted(&mech);
+    let to = start.o + Vec3::new(0.02, -0.03, 0.01);
+    let pose = fit(&mech, &start, to).expect("reachable");
+    assert_eq!(pose.o, to);
+    assert_inside(&mech, &pose);
+    assert!((start.rotation.transpose() * pose.rotation).rotation_vector().norm() < 0.2);
+    assert!(fit(&mech, &start, Vec3::new(0.0, 0.0, 0.95)).is_none(), "legs are 850 mm long at most");
+    let same = fit(&mech, &start, start.o).expect("the start itself");
+    assert!((same.rotation.transpose() * start.rotation).rotation_vector().norm() < 1e-12);
+}
+
+#[test]
+fn boundaries_lie_on_limits_or_on_singularities() {
+    let mech = published();
+    for keep_aspect in [false, true] {
+        let flood = flooded(&mech, &tilted(&mech), 0.05, keep_aspect);
+        let edges = flood.edges(&mech);
+        assert!(edges.len() > 1000);
+        let mut singular = 0;
+        for Edge { pose, stop, margin, .. } in &edges {
+            assert_inside(&mech, pose);
+            match stop {
+                Stop::Limit(i) => {
+                    assert!(margin.abs() <= 1e-9);
+                    let found = mech.limits[*i].margin(&mech, pose, None);
+                    assert!(found.abs() <= 1e-9, "{} {found}", mech.limits[*i].name);
+                }
+                Stop::Singularity => {
+                    singular += 1;
+                    let sigma = conditioning(&mech, pose, mech.characteristic_length).sigma_min;
+                    assert!(sigma < 1e-4, "{sigma}");
+                }
+                Stop::Grid => assert!(pose.o.z < 0.11),
+                Stop::Search => panic!("nothing stops it at {pose:?}"),
+            }
+        }
+        assert_eq!(singular > 0, keep_aspect);
+    }
+}
+
+#[test]
+fn nothing_depends_on_the_number_of_threads() {
+    let mech = published();
+    let run = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+        pool.install(|| {
+            let flood = flooded(&mech, &tilted(&mech), 0.05, true);
+            let edges: Vec<[u64; 4]> = flood
+                .edges(&mech)
+                .iter()
+                .map(|e| [e.share, e.pose.o.x, e.pose.rotation.0[1].y, e.margin].map(f64::to_bits))
+                .collect();
+            let mut lattice = Lattice::new(&mech, &tilted(&mech), 0.05, 0.01).expect("a start");
+            while lattice.wave(&mech) > 0 {}
+            let profile: Vec<u64> = lattice.reached.profile.iter().flatten().map(|x| x.to_bits()).collect();
+            (flood.mask, edges, lattice.reached.inside, lattice.reached.ends, profile)
+        })
+    };
+    assert!(run(1) == run(2));
+}
+
+/// Largest and least coordinates of the boundary.
+fn extents(flood: &Flood, mech: &Mechanism) -> [[f64; 2]; 3] {
+    let mut extents = [[f64::INFINITY, f64::NEG_INFINITY]; 3];
+    for edge in flood.edges(mech) {
+        for (extent, x) in extents.iter_mut().zip(edge.pose.o.array()) {
+            *extent = [extent[0].min(x), extent[1].max(x)];
+        }
+    }
+    extents
+}
+
+#[test]
+fn both_ways_agree_within_their_steps() {
+    let mech = published();
+    let start = tilted(&mech);
+    let mut lattice = Lattice::new(&mech, &start, 0.02, 0.01).expect("a start");
+    while lattice.wave(&mech) > 0 {}
+    let (by_lengths, step) = (lattice.reached.extents, 0.04);
+    let by_poses = extents(&flooded(&mech, &start, step, false), &mech);
+    println!("{by_lengths:?}\n{by_poses:?}");
+    // What one assembly mode reaches the platform can reach: no lattice node lies outside by more than the grid's step.
+    for (axis, ([low, high], [least, most])) in by_lengths.iter().zip(by_poses).enumerate() {
+        assert!(*high <= most + step, "axis {axis}");
+        assert!(axis == 2 || *low >= least - step, "axis {axis}");
+    }
+    // Across the rod nothing but the grid's step sets them apart.
+    assert!(
+        (by_lengths[0][1] - by_poses[0][1]).abs() < step && (by_lengths[0][0] - by_poses[0][0]).abs() < step
+    );
+}
+
+#[test]
+fn a_mechanism_without_strokes_has_no_lattice_and_an_unreachable_start_no_flood() {
+    let free = with_leg("SPU", 3);
+    assert!(Lattice::new(&free, &free.home, 0.1, 0.1).is_none());
+    let mech = published();
+    let high = Pose { o: Vec3::new(0.0, 0.0, 0.98), ..mech.home };
+    assert!(Flood::new(&mech, grid(0.05), &high, false).is_none());
+}
