@@ -6,7 +6,7 @@
 
 use nalgebra::Complex;
 
-use crate::forward::{self, Found, System, step_of, system};
+use crate::forward::{self, FOLD_PIVOTS, Found, System, step_of, system};
 use crate::leg;
 use crate::linear::solve;
 use crate::mechanism::Mechanism;
@@ -29,6 +29,9 @@ const INFINITE: f64 = 1e5;
 
 /// The same for a path that cannot be followed further in double precision.
 const FAR: f64 = 300.0;
+
+/// The same below which a pose may be a real one.
+const NEARBY: f64 = 100.0;
 
 /// Share of a path that is tried first.
 const FIRST_STEP: f64 = 0.3;
@@ -377,7 +380,10 @@ impl Path<'_> {
             return if far(&pose) > FAR { End::Infinite } else { End::Lost };
         }
         let (_, last) = self.correct(&mut pose, &self.to, 40);
-        if t >= 1.0 && last <= CONVERGED { End::Regular(pose) } else { End::Singular(pose) }
+        // Where paths meet, Newton steps may be small by chance: the matrix tells.
+        let System { residual, matrix } = system(self.mech, &pose, &self.to);
+        let determined = far(&pose) > NEARBY || solve(matrix, residual).pivots > FOLD_PIVOTS;
+        if t >= 1.0 && last <= CONVERGED && determined { End::Regular(pose) } else { End::Singular(pose) }
     }
 }
 
@@ -488,7 +494,7 @@ fn keep(mech: &Mechanism, modes: &mut Vec<Mode>, mode: Mode) {
         distance(mech, &Pose::lift(&m.pose), &lifted) < limit
     };
     match modes.iter_mut().find(same) {
-        Some(known) => known.multiplicity += 1,
+        Some(known) => (known.multiplicity, known.singular) = (known.multiplicity + 1, true),
         None => modes.push(mode),
     }
 }

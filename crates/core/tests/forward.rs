@@ -218,7 +218,16 @@ fn modes_that_meet_are_found_together_and_told_apart_next_to_it() {
         let pose = singular_pose(&mech, q, at(k).0, at(k + 1).0);
         let to = lengths(&mech, &pose);
         let modes = assembly_modes(&mech, &generic, &to);
-        assert_eq!(modes.status, Status::Singular);
+        assert_eq!(
+            modes.status,
+            Status::Singular,
+            "{:?}",
+            modes
+                .modes
+                .iter()
+                .map(|m| (apart(&m.pose, &pose), m.multiplicity, m.singular))
+                .collect::<Vec<_>>()
+        );
         let double = modes.modes.iter().find(|m| apart(&m.pose, &pose) < 1e-5).expect("the singular pose");
         assert!(double.singular && double.multiplicity == 2, "{double:?}");
         // Lengths a little off across the fold: two modes nearby on one side, none on the other.
