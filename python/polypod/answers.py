@@ -57,11 +57,11 @@ class ForwardKinematics(NamedTuple):
 
 
 class AssemblyModes(NamedTuple):
-    """All real poses for given leg lengths, highest first [T28]; NaN beyond `count`."""
+    """All real poses for given leg lengths, highest first [T28]; NaN beyond `number`."""
 
     pose: Array
-    """(..., m, 4, 4), m the largest count of the batch."""
-    count: NDArray[np.int64]
+    """(..., m, 4, 4), m the largest number in the batch."""
+    number: NDArray[np.int64]
     """(...): number of modes."""
     determinant_sign: Array
     """(..., m): sign of det J, 0 where modes meet."""
@@ -72,7 +72,7 @@ class AssemblyModes(NamedTuple):
     residual: Array
     """(..., m): the largest error of a length or of a constraint, m."""
     mode_status: Codes
-    """(..., m): `Status` of each pose: within its limits or not; INVALID_INPUT beyond `count`."""
+    """(..., m): `Status` of each pose: within its limits or not; INVALID_INPUT beyond `number`."""
     status: Codes
     """(...): SINGULAR where modes meet, NOT_CONVERGED where one may be missing."""
 

@@ -561,7 +561,7 @@ class Mechanism:
         >>> import polypod as pp
         >>> mech = pp.load("lu-3spu-2rpu-r")
         >>> modes = mech.assembly_modes([0.769, 0.850, 0.769, 0.650, 0.650])
-        >>> int(modes.count), pp.Status(int(modes.status)).name
+        >>> int(modes.number), pp.Status(int(modes.status)).name
         (8, 'OK')
         """
         shape, (flat,) = self._batch(lengths=(lengths, (self.n_legs,)))
@@ -580,7 +580,7 @@ class Mechanism:
             padded[name] = np.full(present.shape + column.shape[1:], empty, dtype=column.dtype)
             padded[name][present] = column
         padded["mode_status"] = padded.pop("status")
-        return AssemblyModes(**_shaped({**padded, "count": count, "status": status}, shape))
+        return AssemblyModes(**_shaped({**padded, "number": count, "status": status}, shape))
 
     # --- dynamics ----------------------------------------------------------------------------------------
 
