@@ -39,6 +39,9 @@ const LONGEST_STEP: f64 = 0.5;
 /// Share of a Newton step below which there is no way nearer to a solution.
 const SMALLEST_SHARE: f64 = 1e-7;
 
+/// How much nearer to where a motion points the one of two solutions must be to be the one that it goes to.
+const CLEARLY: f64 = 0.25;
+
 /// Pivot ratio of the equations below which two assembly modes meet: the pose is then only known to the square root
 /// of rounding.
 pub const FOLD_PIVOTS: f64 = 1e-5;
@@ -141,6 +144,37 @@ pub fn forward_kinematics(mech: &Mechanism, lengths: &[f64], guess: &Pose<f64>) 
     let other = polish(mech, &squares, guess);
     let status = if other.status == Status::Ok { Status::ModeJump } else { other.status };
     Found { iterations: steps + other.iterations, status, ..other }
+}
+
+/// The solution that a motion through the poses `before` and `last` leads to if it goes on evenly, where this is one of
+/// another mode than the one that was `found`, and clearly the nearer to where the motion points: then the motion has
+/// passed a singularity between the states, which the lengths alone do not show \[T27\].
+#[must_use]
+pub fn passed(
+    mech: &Mechanism,
+    lengths: &[f64],
+    before: &Pose<f64>,
+    last: &Pose<f64>,
+    found: &Found,
+) -> Option<Found> {
+    let squares: [f64; 6] = std::array::from_fn(|i| lengths.get(i).map_or(0.0, |l| l * l));
+    let turn = last.rotation * before.rotation.transpose();
+    let ahead = Pose { rotation: turn * last.rotation, o: last.o + last.o - before.o };
+    if newton(mech, &ahead, &squares, &[0.0; 6]).sign == found.sign {
+        return None;
+    }
+    let (pose, steps) = continuation(mech, &squares, &ahead);
+    let other = polish(mech, &squares, &pose?);
+    let from_ahead = |pose: &Pose<f64>| {
+        let turned = (ahead.rotation.transpose() * pose.rotation).rotation_vector().norm();
+        turned.hypot((pose.o - ahead.o).norm() / mech.characteristic_length)
+    };
+    let nearer = from_ahead(&other.pose) < CLEARLY * from_ahead(&found.pose);
+    (other.status == Status::Ok && nearer).then_some(Found {
+        iterations: found.iterations + steps + other.iterations,
+        status: Status::ModeJump,
+        ..other
+    })
 }
 
 /// Follows the solutions of `F = (1 - t) F(guess)` from the guess at t = 0 to t = 1 by Newton's method, in one piece if

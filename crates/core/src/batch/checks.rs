@@ -2,7 +2,7 @@
 
 use crate::constraint;
 use crate::leg;
-use crate::limits;
+use crate::limits::{self, Limit};
 use crate::mechanism::Mechanism;
 use crate::quadratic::quadratic;
 use crate::spatial::{Acceleration, Mat3, Pose, Twist, Vec3};
@@ -120,8 +120,12 @@ pub(super) fn check_finite(values: &[f64]) -> Status {
 
 /// The first limit of a joint that a pose breaks.
 pub(super) fn limit_status(mech: &Mechanism, pose: &Pose<f64>) -> Status {
-    let of_joints = mech.limits.iter().take_while(|limit| limit.status() != Status::Ok);
-    limits::status(of_joints.map(|limit| (limit, limit.margin(mech, pose, None))))
+    limits::status(joint_limits(mech).map(|limit| (limit, limit.margin(mech, pose, None))))
+}
+
+/// The limits of joints, which come first in the list.
+pub(super) fn joint_limits(mech: &Mechanism) -> impl Iterator<Item = &Limit> {
+    mech.limits.iter().take_while(|limit| limit.status() != Status::Ok)
 }
 
 pub(super) fn outcome(mech: &Mechanism, solution: &[f64; 6], pivots: f64) -> Status {

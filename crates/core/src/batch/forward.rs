@@ -1,14 +1,17 @@
 //! Forward kinematics of many states.
 
 use super::Table;
-use super::checks::{actuated_values, check_legs, is_rotation, limit_status, raw_pose, then};
-use crate::forward::{Found, forward_kinematics as find};
+use super::checks::{actuated_values, check_legs, is_rotation, joint_limits, raw_pose, then};
+use crate::forward::{Found, forward_kinematics as find, passed};
+use crate::limits;
 use crate::mechanism::Mechanism;
 use crate::modes::{self, Start};
+use crate::spatial::Pose;
 use crate::status::Status;
 
 /// The pose for each set of lengths of all legs (those of passive legs are not read), in the assembly mode of its
-/// guess: one for each state or one for all. `continued` starts each state from the last one that was solved \[T26\].
+/// guess: one for each state or one for all. `continued` starts each state from the last one that was solved, and tells
+/// where a motion through the states has passed a singularity \[T27\].
 #[must_use]
 pub fn forward_kinematics(
     mech: &Mechanism,
@@ -19,7 +22,8 @@ pub fn forward_kinematics(
     let n = lengths.len() / mech.legs.len();
     let (mut table, [poses, residuals, iterations]) =
         Table::new(n, [("pose", vec![4, 4]), ("residual", vec![]), ("iterations", vec![])]);
-    let mut last = None;
+    // The last pose that was solved, and the one of the state before it.
+    let (mut last, mut before, mut solved) = (None, None, false);
     for i in 0..n {
         let guess = match (last, guesses) {
             (Some(pose), _) if continued => pose,
@@ -33,27 +37,37 @@ pub fn forward_kinematics(
                 raw_pose(guesses, k)
             }
         };
-        let Found { pose, residual, iterations: steps, status, .. } =
-            find(mech, &actuated_values(mech, lengths, i), &guess);
-        // A root that a constraint has only because a leg has no frame there is none.
-        let status = match then(status, || check_legs(mech, &pose)) {
-            Status::Ok => limit_status(mech, &pose),
-            other => other,
-        };
+        let values = actuated_values(mech, lengths, i);
+        let mut found = find(mech, &values, &guess);
+        if let (true, Some(last), Some(before), Status::Ok) = (continued, last, before, found.status) {
+            found = passed(mech, &values, &before, &last, &found).unwrap_or(found);
+        }
+        let Found { pose, residual, iterations: steps, status, .. } = found;
+        let status = then(status, || check_found(mech, &pose, residual));
         table.status[i] = status;
         if !matches!(status, Status::NotConverged | Status::InvalidInput) {
             table.set_pose(poses, i, &pose);
             table.set(residuals, i, 0, &[residual]);
         }
         table.set(iterations, i, 0, &[f64::from(steps)]);
-        if !matches!(
-            status,
-            Status::NotConverged | Status::InvalidInput | Status::Singular | Status::ModeJump
-        ) {
-            last = Some(pose);
-        }
+        let unsolved = [Status::NotConverged, Status::InvalidInput, Status::Singular, Status::ModeJump]
+            .contains(&status);
+        (last, before) = if unsolved { (last, None) } else { (Some(pose), last.filter(|_| solved)) };
+        solved = !unsolved;
     }
     table
+}
+
+/// Whether a pose that was found is one that the mechanism can be in, and within its limits. A root that a constraint
+/// has only because a leg has no frame there is none. Strokes are judged by the lengths that were asked for, which the
+/// pose's own miss by the residual: lengths at the very end of a stroke are within it.
+fn check_found(mech: &Mechanism, pose: &Pose<f64>, residual: f64) -> Status {
+    then(check_legs(mech, pose), || {
+        limits::status(joint_limits(mech).map(|limit| {
+            let missed = if limit.status() == Status::OutOfStroke { residual } else { 0.0 };
+            (limit, limit.margin(mech, pose, None) + missed)
+        }))
+    })
 }
 
 /// All assembly modes of each set of lengths, one after the other, and how many belong to each set \[T28\].
@@ -82,12 +96,8 @@ pub fn assembly_modes(mech: &Mechanism, start: &Start, lengths: &[f64]) -> AllMo
         table.set(above, i, 0, &[f64::from(u8::from(mode.above))]);
         table.set(multiplicity, i, 0, &[f64::from(mode.multiplicity)]);
         table.set(residual, i, 0, &[mode.residual]);
-        table.status[i] = match then(if mode.singular { Status::Singular } else { Status::Ok }, || {
-            check_legs(mech, &mode.pose)
-        }) {
-            Status::Ok => limit_status(mech, &mode.pose),
-            other => other,
-        };
+        let status = if mode.singular { Status::Singular } else { Status::Ok };
+        table.status[i] = then(status, || check_found(mech, &mode.pose, mode.residual));
     }
     let counts = found.iter().map(|f| f.modes.len()).collect();
     AllModes { modes: table, counts, status: found.iter().map(|f| f.status).collect() }
