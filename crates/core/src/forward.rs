@@ -163,7 +163,7 @@ pub fn passed(
     if newton(mech, &ahead, &squares, &[0.0; 6]).sign == found.sign {
         return None;
     }
-    let (pose, steps) = continuation(mech, &squares, &ahead);
+    let (pose, steps) = continuation(mech, &squares, &ahead, SHORTEST_PIECE);
     let other = polish(mech, &squares, &pose?);
     let from_ahead = |pose: &Pose<f64>| {
         let turned = (ahead.rotation.transpose() * pose.rotation).rotation_vector().norm();
