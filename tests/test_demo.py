@@ -11,6 +11,7 @@ import pytest
 
 import polypod as pp
 from polypod.demo import EXAMPLE, run_demo
+from polypod.paper import fit_markdown, fit_table_i, table_i
 
 
 @pytest.fixture(scope="module")
@@ -62,6 +63,7 @@ def test_summary_tells_measured_numbers(demo):
         f"{torque[np.argmax(np.abs(torque))]:.0f} N m",
         f"smallest singular value {data['sigma_min'].min():.3f}",
         "the published sum is right",
+        fit_markdown(table_i(pp.load(EXAMPLE)), fit_table_i(pp.load(EXAMPLE))),
         "Eq. 44",
         "statically indeterminate",
         "polypod info",
