@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import csv
 import json
 import re
@@ -17,6 +18,7 @@ from polypod.lengths import load_lengths
 NAME = "lu-3spu-2rpu-r"
 DATA = Path(__file__).parent / "data"
 PER_METRE = {"m": 1.0, "mm": 1e3, "cm": 1e2, "um": 1e6, "in": 1 / 0.0254}
+STEWART = DATA / "stewart-gough.toml"
 NOWHERE = [0.1, 0.9, 0.1, 0.9, 0.1]  # no pose has these lengths
 
 
@@ -54,7 +56,7 @@ def write(path, rows, units=("mm",) * 5, order=range(5), names="12345"):
 
 
 def poses(mech, n=1):
-    """Poses along a path that starts near home, in the mode that lies near its regular neighbours."""
+    """Poses along a short path, (n, 4, 4)."""
     s = np.linspace(0.0, 1.0, n)
     return mech.pose(
         {
@@ -75,6 +77,18 @@ def read_json(result, status=0):
 
 def distances(row, pose):
     return [np.abs(np.array(mode["pose"]) - pose).max() for mode in row["modes"]]
+
+
+def seven_legs(path):
+    """A hexapod with a passive leg in the middle, saved in `path`, and its lengths at home."""
+    data = pp.load(STEWART).to_dict()
+    del data["published"]
+    leg = copy.deepcopy(data["legs"][0])
+    leg["base"]["point"]["radius"] = leg["platform"]["point"]["radius"] = 100.0
+    data["legs"].append({**leg, "actuated": False})
+    mech = pp.Mechanism.from_dict(data)
+    mech.save(path)
+    return mech, mech.inverse_kinematics(mech.home).lengths
 
 
 # --- all modes ----------------------------------------------------------------------------------------------
@@ -131,12 +145,13 @@ def test_columns_have_any_order_and_unit(run, mech, path):
     np.testing.assert_allclose(load_lengths(path, mech), lengths, rtol=1e-14)
 
 
-def test_legs_without_actuator_need_no_column(run, path, mech):
-    data = mech.to_dict()
-    data["legs"][3]["actuated"] = False
-    passive = pp.Mechanism.from_dict(data)
-    write(path, [[0.7] * 5], order=(0, 1, 2, 4))
-    np.testing.assert_array_equal(load_lengths(path, passive), [[0.7, 0.7, 0.7, np.nan, 0.7]])
+def test_legs_without_actuator_need_no_column(run, path, tmp_path):
+    mech, home = seven_legs(tmp_path / "seven.toml")
+    write(path, [home], ("mm",) * 7, range(6), "1234567")
+    np.testing.assert_allclose(load_lengths(path, mech), [[*home[:6], np.nan]], rtol=1e-15)
+    for near in ((), ("--near",)):
+        facts = read_json(run("fk", tmp_path / "seven.toml", path, "--json", *near))
+        assert min(distances(facts["rows"][0], mech.home)) < 1e-9
 
 
 def test_rows_without_pose_give_exit_status_1(run, mech, path):
@@ -175,21 +190,32 @@ def test_other_mechanisms(run, path, file):
 # --- near ---------------------------------------------------------------------------------------------------
 
 
-def test_near_follows_one_mode_along_the_rows(run, mech, path):
-    """As Python does, with each row from the one before; the sign of det J is that of the same mode."""
-    lengths = load_lengths(write(path, mech.inverse_kinematics(poses(mech, 9)).lengths), mech)
-    followed = mech.forward_kinematics(lengths, continued=True)
-    facts = read_json(run("fk", NAME, path, "--near", "--json"))
-    modes = read_json(run("fk", NAME, path, "--json"))
+def test_near_follows_one_mode_along_the_rows(run, path):
+    """From a regular home along poses that are known; the sign of det J is that of the same mode."""
+    mech = pp.load(STEWART)
+    s = np.linspace(0.0, 1.0, 5)
+    move = {"x": 0.1 * s, "y": -0.05 * s, "z": 0.6 + 0.05 * s, "rx": 0.1 * s, "ry": 0.05 * s, "rz": 0.2 * s}
+    known = mech.pose(move)
+    write(path, mech.inverse_kinematics(known).lengths, ("mm",) * 6, range(6), mech.leg_names)
+    followed = mech.forward_kinematics(load_lengths(path, mech), continued=True)
+    facts = read_json(run("fk", STEWART, path, "--near", "--json"))
+    modes = read_json(run("fk", STEWART, path, "--json"))
     for i, (row, all_of_row) in enumerate(zip(facts["rows"], modes["rows"], strict=True)):
         (mode,) = row["modes"]
+        assert distances(row, known[i])[0] < 1e-9
         assert mode["pose"] == followed.pose[i].tolist()
         assert row["status"] == mode["status"] == pp.Status(int(followed.status[i])).name
         assert (mode["above"], mode["multiplicity"]) == (None, None)
-        near = distances(all_of_row, followed.pose[i])
-        assert min(near) < 1e-9
-        same = all_of_row["modes"][int(np.argmin(near))]
-        assert mode["determinant_sign"] == same["determinant_sign"]
+        same = all_of_row["modes"][int(np.argmin(distances(all_of_row, known[i])))]
+        assert mode["determinant_sign"] == same["determinant_sign"] != 0
+
+
+def test_near_says_that_the_mode_of_home_has_ended(run, path):
+    """The pose that was found stands, so the exit status is 0."""
+    write(path, [[0.75] * 5])
+    status, out, _ = run("fk", NAME, path, "--near")
+    assert status == 0
+    assert f"Row 1: MODE_JUMP: {pp.Status.MODE_JUMP.message}" in out
 
 
 def test_near_tells_where_there_is_no_pose(run, mech, path):
@@ -207,7 +233,7 @@ def test_near_tells_where_there_is_no_pose(run, mech, path):
 def test_the_result_has_one_line_for_each_mode(run, mech, path, near):
     result = path.with_name("poses.csv")
     result.write_text("an older result")
-    write(path, [mech.inverse_kinematics(poses(mech)[0]).lengths, NOWHERE])
+    write(path, [mech.inverse_kinematics(mech.home).lengths, NOWHERE])
     facts = read_json(run("fk", NAME, path, "-o", result, "--json", *near), 1)
     assert facts["result"] == str(result)
     with result.open(encoding="utf-8", newline="") as file:
@@ -286,17 +312,20 @@ def test_result_that_cannot_be_written_is_an_error_before_any_work(run, path, re
     write(path, [NOWHERE])
     before = path.read_text()
     monkeypatch.setattr("polypod.mechanism.load", lambda _: pytest.fail("worked first"))
-    assert_one_message(run("fk", NAME, path, "-o", path.with_name(result)))
+    assert_one_message(run("fk", NAME, path, "-o", path.parent / result))
     assert path.read_text() == before
 
 
-def test_a_mechanism_without_a_finite_number_of_modes(run, mech, path, tmp_path):
-    data = mech.to_dict()
-    data["legs"][3]["actuated"] = False
-    del data["published"]
-    pp.Mechanism.from_dict(data).save(tmp_path / "passive.toml")
-    write(path, [[0.7] * 5])
-    assert_one_message(run("fk", tmp_path / "passive.toml", path), "as many actuated legs as freedoms")
+def test_a_design_that_is_singular_everywhere_has_no_answer(run, path, tmp_path):
+    """A hexapod whose platform is its base made smaller."""
+    data = pp.load(STEWART).to_dict()
+    for leg in data["legs"]:
+        leg["platform"]["point"] = {**leg["base"]["point"], "radius": 300.0}
+    pp.Mechanism.from_dict(data).save(tmp_path / "singular.toml")
+    write(path, [[0.7] * 6], ("mm",) * 6, range(6), "123456")
+    assert_one_message(
+        run("fk", tmp_path / "singular.toml", path), "a design that is not singular everywhere"
+    )
 
 
 def test_help_shows_an_example(run):
