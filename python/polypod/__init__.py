@@ -12,6 +12,7 @@ from polypod import errors
 from polypod._core import __version__
 from polypod.errors import (
     CoordinateError,
+    LengthsError,
     MechanismError,
     MotionError,
     PolypodError,
@@ -41,6 +42,7 @@ _LATER = {
 
 __all__ = [
     "CoordinateError",
+    "LengthsError",
     "Mechanism",
     "MechanismError",
     "Motion",

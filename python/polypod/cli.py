@@ -289,12 +289,14 @@ def solve(
         raise typer.Exit(1)
 
 
-def _check_result_path(path: Path, *inputs: str) -> None:
+def _check_result_path(path: Path, *inputs: str, suffixes: tuple[str, ...] = RESULT_SUFFIXES) -> None:
     """Before any work: what would fail after it."""
     from polypod.errors import SolutionError
 
-    if path.suffix not in RESULT_SUFFIXES:
-        raise SolutionError(f"{path} ends in {path.suffix!r}; a result's file ends in .nc or .csv")
+    if path.suffix not in suffixes:
+        raise SolutionError(
+            f"{path} ends in {path.suffix!r}; a result's file ends in {' or '.join(suffixes)}"
+        )
     if path.exists() and any(Path(name).exists() and path.samefile(name) for name in inputs):
         raise SolutionError(f"{path} is an input; the result would overwrite it, give it another name")
     if path.is_dir():
@@ -392,6 +394,86 @@ def _print_solution(out: Console, facts: dict[str, Any]) -> None:
         out.print("All states have an answer, but some are beyond a limit.")
     else:
         out.print("All states have an answer, within all limits.")
+
+
+# --- fk -----------------------------------------------------------------------------------------------------
+
+
+@app.command(epilog="Example: [bold]polypod fk lu-3spu-2rpu-r lengths.csv -o poses.csv[/bold]")
+def fk(
+    mechanism: MechanismArgument,
+    lengths: Annotated[
+        Path,
+        typer.Argument(
+            metavar="LENGTHS",
+            help="A .csv file: a header such as 1 [mm], 2 [mm], ... and rows of leg lengths.",
+        ),
+    ],
+    result: Annotated[
+        Path | None,
+        typer.Option("-o", "--output", metavar="RESULT", help="Table of the poses, .csv; it is overwritten."),
+    ] = None,
+    near: Annotated[
+        bool, typer.Option("--near", help="Follow one pose from home along the rows instead of finding all.")
+    ] = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Find the poses that have given leg lengths: all assembly modes, or the one near home.
+
+    The exit status is 1 if a row has no pose, or if one of its poses may be missing.
+    """
+    from polypod.lengths import load_lengths, save_table, tabulate_continued, tabulate_modes
+    from polypod.mechanism import load
+
+    if result is not None:
+        _check_result_path(result, mechanism, str(lengths), suffixes=(".csv",))
+    mech = load(mechanism)
+    sets = load_lengths(lengths, mech)
+    with _working("finding poses"):
+        facts = (tabulate_continued if near else tabulate_modes)(mech, sets)
+    if result is not None:
+        save_table(facts, mech, result)
+    if as_json:
+        _print_json(facts if result is None else {**facts, "result": str(result)})
+    else:
+        _print_poses(_console(), facts)
+        if result is not None:
+            _console().print(f"Written: {escape(str(result))}", soft_wrap=True)
+    if facts["without_pose"] or facts["incomplete"]:
+        raise typer.Exit(1)
+
+
+def _print_poses(out: Console, facts: dict[str, Any]) -> None:
+    from polypod.motion import KIND_OF_COORDINATE
+    from polypod.units import from_si
+
+    rows = [(row, mode) for row in facts["rows"] for mode in row["modes"]]
+    if rows:
+        coordinates = rows[0][1]["coordinates"]
+        angles = [name for name in coordinates if KIND_OF_COORDINATE[name] == "angle"]
+        headers = ["row>", "mode>", "o / mm>", *(f"{name} / deg>" for name in angles)]
+        poses = _table(f"Poses of {escape(facts['mechanism'])}", *headers, "side", "det J", "status")
+        for row, mode in rows:
+            position = ", ".join(f"{1e3 * line[3]:.1f}" for line in mode["pose"][:3])
+            turns = [mode["coordinates"][name] for name in angles]
+            poses.add_row(
+                str(row["row"]),
+                str(mode["mode"]),
+                position,
+                *(_f(None if turn is None else from_si(turn, "angle", "deg")) for turn in turns),
+                {True: "above", False: "below", None: ""}[mode["above"]],
+                {1: "+", 0: "0", -1: "-", None: ""}[mode["determinant_sign"]],
+                mode["status"],
+            )
+        out.print(poses)
+    for row in facts["rows"]:
+        said = []
+        if not row["modes"]:
+            said.append("no pose has these lengths" if row["status"] == "OK" else "no pose was found")
+        if row["status"] != "OK":
+            said.append(f"{row['status']}: {row['message']}")
+        if said:
+            out.print(f"Row {row['row']}: {escape('; '.join(said))}", soft_wrap=True)
 
 
 # --- printing -----------------------------------------------------------------------------------------------

@@ -50,6 +50,13 @@ class MotionError(_FaultyInputError):
         super().__init__(faults, source)
 
 
+class LengthsError(_FaultyInputError):
+    """Leg lengths that cannot be used: `faults` holds everything wrong with their file."""
+
+    def __init__(self, faults: Iterable[Fault], source: str = "the leg lengths") -> None:
+        super().__init__(faults, source)
+
+
 class SolutionError(PolypodError):
     """A file of results that cannot be read or written."""
 

@@ -25,20 +25,16 @@ A TOML file gives keyframes and the curve through them:
 
 from __future__ import annotations
 
-import csv
 import itertools
 import math
-import re
 import tomllib
-from collections import Counter
 from collections.abc import Iterable, Mapping
-from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from importlib import resources
 from importlib.resources.abc import Traversable
 from os import PathLike
 from pathlib import Path
-from typing import Annotated, Any, Literal, NamedTuple, Protocol
+from typing import Annotated, Any, Literal, Protocol
 
 import numpy as np
 from annotated_types import Ge
@@ -46,9 +42,10 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic import Strict, create_model
 from scipy.interpolate import BPoly, make_interp_spline
 
+from polypod.columns import Column, columns_to_si, read_header, read_numbers, read_rows
 from polypod.errors import Fault, MotionError, ShapeError, UnknownNameError, alternatives, shown
 from polypod.schema import Number, Table, Vector, read_table
-from polypod.units import MOTION_KINDS, UNITS, read_units, to_si
+from polypod.units import MOTION_KINDS, read_units
 
 Array = NDArray[np.float64]
 Axes = Literal["base", "platform"]
@@ -293,16 +290,8 @@ def _nearest_set(names: Iterable[str], sets: CoordinateSets) -> str:
 # --- CSV ----------------------------------------------------------------------------------------------------
 
 
-class _Column(NamedTuple):
-    name: str
-    kind: str | None
-    unit: str
-
-
 def _read_csv(text: str, source: str, mech: HasCoordinateSets | CoordinateSets) -> Motion:
-    reader = csv.reader(text.splitlines(), skipinitialspace=True)
-    rows = [(f"line {reader.line_num}", [cell.strip() for cell in row]) for row in reader]
-    rows = [(place, row) for place, row in rows if any(row) and not row[0].startswith("#")]
+    rows = read_rows(text)
     if not rows:
         message = "is empty; needs a header such as time [s], x [mm], ... and two samples or more"
         raise MotionError([Fault("file", message)], source)
@@ -323,26 +312,18 @@ def _read_csv(text: str, source: str, mech: HasCoordinateSets | CoordinateSets) 
     return Motion.through(by_name["time"], q, set=chosen, name=Path(source).stem, wrench=wrench)
 
 
-def _columns(
-    header: list[str], place: str, sets: CoordinateSets, faults: list[Fault]
-) -> list[_Column | None]:
+def _columns(header: list[str], place: str, sets: CoordinateSets, faults: list[Fault]) -> list[Column | None]:
     """The columns that a header names, None for an unknown one."""
     coordinates = {name: KIND_OF_COORDINATE[name] for names in sets.values() for name in names}
     kinds = {"time": "time"} | coordinates | KIND_OF_WRENCH
-    columns: list[_Column | None] = []
-    for cell in header:
-        column, message = _column(cell, kinds)
-        columns.append(column)
-        if message:
-            faults.append(Fault(place, f"column {shown(cell)} {message}"))
-    count = Counter(column.name for column in columns if column)
-    faults += [Fault(place, f"column {name} stands there {n} times") for name, n in count.items() if n > 1]
-    if "time" not in count:
+    columns = read_header(header, place, kinds, faults)
+    named = dict.fromkeys(column.name for column in columns if column)
+    if "time" not in named:
         faults.append(Fault(place, "there is no column time [s]"))
-    given = count.keys() & coordinates.keys()
+    given = named.keys() & coordinates.keys()
     chosen = _nearest_set(given, sets)
     lacking = [name for name in sets[chosen] if name not in given]
-    beside = [name for name in count if name in given and name not in sets[chosen]]
+    beside = [name for name in named if name in given and name not in sets[chosen]]
     if lacking or beside:
         found = [*(f"no {name}" for name in lacking), *(f"also {name}" for name in beside)]
         message = (
@@ -352,43 +333,15 @@ def _columns(
     return columns
 
 
-def _column(cell: str, kinds: Mapping[str, str | None]) -> tuple[_Column | None, str | None]:
-    """The column that a cell of the header names, as far as it does, and what is wrong."""
-    parts = re.fullmatch(r"(\w+)\s*(?:\[(.*)\])?", cell)
-    if not parts:
-        return None, "must be a name and a unit, such as x [mm]"
-    name, unit = parts[1], (parts[2] or "").strip()
-    if name not in kinds:
-        return None, f"is unknown; {alternatives(name, kinds)}"
-    kind = kinds[name]
-    valid = UNITS[kind] if kind else ("", "1")
-    if unit in valid:
-        return _Column(name, kind, unit), None
-    problem = f"has the unit {shown(unit)}" if unit else "has no unit"
-    return _Column(name, None, ""), f"{problem}; {alternatives(unit, valid) if kind else 'it needs none'}"
-
-
-def _samples(body: list[tuple[str, list[str]]], columns: list[_Column | None], faults: list[Fault]) -> Array:
+def _samples(body: list[tuple[str, list[str]]], columns: list[Column | None], faults: list[Fault]) -> Array:
     """The numbers below the header, SI, (N, columns); NaN where there is a fault."""
-    samples = np.full((len(body), len(columns)), np.nan)
-    for sample, (place, row) in zip(samples, body, strict=True):
-        if len(row) != len(columns):
-            faults.append(Fault(place, f"has {len(row)} cells; the header has {len(columns)}"))
-            continue
-        for i, (cell, column) in enumerate(zip(row, columns, strict=True)):
-            with suppress(ValueError):
-                sample[i] = float(cell)
-            if not math.isfinite(sample[i]):
-                name = column.name if column else f"number {i + 1}"
-                faults.append(Fault(place, f"column {name} is {shown(cell)}; needs a finite number"))
+    samples = read_numbers(body, columns, faults)
     if len(body) < 2:
         faults.append(Fault("file", f"has too few samples, {len(body)}; needs two or more"))
     for i, column in enumerate(columns):
         if column and column.name == "time":
             faults += _not_increasing([place for place, _ in body], samples[:, i].tolist())
-        if column and column.kind:
-            samples[:, i] = to_si(samples[:, i], column.kind, column.unit)
-    return samples
+    return columns_to_si(samples, columns)
 
 
 def _not_increasing(places: Iterable[str], times: Iterable[float]) -> list[Fault]:
