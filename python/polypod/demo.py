@@ -15,6 +15,7 @@ from polypod import plots
 from polypod.mechanism import load
 from polypod.motion import load_motion
 from polypod.results import Solution
+from polypod.section4 import Section4, as_markdown, section4
 from polypod.solution import solve
 from polypod.summary import describe, summarise
 
@@ -64,7 +65,12 @@ def run_demo(directory: str | PathLike[str]) -> Demo:
         for suffix in (".png", ".svg"):
             plots.save_figure(figure, directory / (name + suffix))
             files.append(name + suffix)
-    text = _summary(facts, path)
+    found = section4(mech)
+    views = plots.plot_workspace(found.flood, Figure(figsize=(8.0, 7.4)))
+    for suffix in (".png", ".svg"):
+        plots.save_figure(views, directory / f"fig3{suffix}")
+        files.append(f"fig3{suffix}")
+    text = _summary(facts, path) + _workspace_summary(found)
     (directory / "summary.md").write_text(text, encoding="utf-8")
     return Demo(directory, (*files, "summary.md"), facts, path, text)
 
@@ -140,6 +146,19 @@ curves are in a figure without numbers; this motion is Polypod's.
 - `solution.nc`, `solution.csv`: every quantity with its unit; `polypod.load_solution` reads both
 - `polypod info {facts["name"]}`: freedoms, constraints, conditioning, warnings
 - `polypod solve {facts["name"]} your-motion.csv -o result.nc`: your own motion
+"""
+
+
+def _workspace_summary(found: Section4) -> str:
+    facts = found.facts()
+    flood = facts["flood"]
+    return f"""
+## Workspace of Section 4
+
+{as_markdown(facts)}
+
+`fig3.png` shows the first, coloured by what ends it. Its volume is {flood["volume"]:.3f} m³, give or take
+{100 * flood["volume_error"] / flood["volume"]:.1g} %. The paper steps the lengths by 10 mm, which takes longer.
 """
 
 

@@ -19,7 +19,7 @@ from polypod.errors import WorkspaceError
 from polypod.mechanism import Mechanism
 from polypod.regions import Grid, unit
 from polypod.results import _replacing
-from polypod.style import GREY, INK, PALETTE
+from polypod.style import GREY, INK, PALE, YELLOW, color_of
 
 if TYPE_CHECKING:
     import trimesh
@@ -37,6 +37,8 @@ SUFFIXES = (".stl", ".ply", ".nc")
 """Of files that a workspace is saved to."""
 
 _FORMAT = "polypod workspace 1"
+
+WHITE = "#FFFFFF"
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,7 +97,7 @@ class Workspace:
         order = np.argsort(-counts, kind="stable")
         return {self.label_names[i]: float(counts[i] / len(self.labels)) for i in order if counts[i]}
 
-    @property
+    @cached_property
     def mechanism(self) -> Mechanism:
         """The mechanism, as it was given."""
         return Mechanism.from_toml(self.inputs["mechanism_file"])
@@ -186,21 +188,32 @@ class Workspace:
         vertex = np.dtype([("at", "<f8", 3), ("color", "u1", 3), ("label", "<i4")])
         points = np.empty(len(self.vertices), vertex)
         points["at"], points["label"] = self.vertices, self.labels
-        rgb = np.array([[int(c[i : i + 2], 16) for i in (1, 3, 5)] for c in self.colors()], np.uint8)
+        rgb = np.array([[int(c[i : i + 2], 16) for i in (1, 3, 5)] for c in self.colors], np.uint8)
         points["color"] = rgb[self.labels]
         triangles = np.empty(len(self.faces), np.dtype([("n", "u1"), ("of", "<i4", 3)]))
         triangles["n"], triangles["of"] = 3, self.faces
         return header.encode() + points.tobytes() + triangles.tobytes()
 
+    @cached_property
     def colors(self) -> tuple[str, ...]:
-        """The colour of each label: those that occur take the palette's in their order."""
-        extra = {SINGULARITY: INK, EDGE_OF_GRID: GREY, NO_POSE: PALETTE[-1]}
-        used = iter([*PALETTE[:-1]] * len(self.label_names))
-        present = {*np.unique(self.labels).tolist()}
-        return tuple(
-            extra.get(name) or (next(used) if i in present else GREY)
-            for i, name in enumerate(self.label_names)
-        )
+        """The colour of each label: a limit has that of its first leg, paler for a least value."""
+        legs = self.mechanism.leg_names
+        result = []
+        for limit in self.mechanism.limit_list:
+            color = color_of(legs.index(limit.legs[0])) if limit.legs else YELLOW
+            least = limit.kind.endswith("min")
+            plain = limit.kind.endswith("max") or not limit.legs
+            result.append(
+                _mixed(color, WHITE, 0.5) if least else color if plain else _mixed(color, INK, 0.45)
+            )
+        others = {SINGULARITY: INK, EDGE_OF_GRID: PALE, NO_POSE: GREY}
+        return (*result, *(others[name] for name in self.label_names[len(result) :]))
+
+
+def _mixed(color: str, other: str, share: float) -> str:
+    """A colour with a share of another one."""
+    parts = [[int(c[i : i + 2], 16) for i in (1, 3, 5)] for c in (color, other)]
+    return "#" + "".join(f"{round((1 - share) * a + share * b):02X}" for a, b in zip(*parts, strict=True))
 
 
 def check_suffix(path: Path, coordinates: int) -> None:

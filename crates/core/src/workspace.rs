@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use crate::jacobian::scaled_jacobian;
 use crate::linear::solve;
 use crate::mechanism::Mechanism;
-use crate::reach::{fit, nearest_limit};
+use crate::reach::{first_limit, fit, nearest_limit};
 use crate::spatial::{Mat3, Pose, Vec3};
 
 /// A cubic grid; its nodes, the middles of cubic cells, are counted with z fastest.
@@ -207,15 +207,16 @@ impl Flood {
                 None => high = middle,
             }
         }
-        let nearest = nearest_limit(mech, &pose);
+        let binding = first_limit(mech, &pose, AT_LIMIT);
         let beyond = || fit(mech, &pose, inner + way * high);
-        let stop = match (nearest, self.sign) {
+        let stop = match (binding, self.sign) {
             _ if ends && low >= whole - EXACT / self.grid.step => Stop::Grid,
-            (Some((limit, margin)), _) if margin <= AT_LIMIT => Stop::Limit(limit),
+            (Some(limit), _) => Stop::Limit(limit),
             (_, Some(kept)) if beyond().is_none_or(|p| sign(mech, &p) != kept) => Stop::Singularity,
             _ => Stop::Search,
         };
-        Edge { node, direction, share: low, pose, stop, margin: nearest.map_or(f64::NAN, |(_, m)| m) }
+        let margin = nearest_limit(mech, &pose).map_or(f64::NAN, |(_, margin)| margin);
+        Edge { node, direction, share: low, pose, stop, margin }
     }
 }
 
@@ -237,6 +238,7 @@ pub struct Edge {
 /// What keeps the platform from going further.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stop {
+    /// On the boundary several limits may bind at once: the first of them in the mechanism's order.
     Limit(usize),
     /// Beyond, the sign of det J would change.
     Singularity,
