@@ -416,8 +416,8 @@ def workspace(
     kind: Annotated[
         Kind | None,
         typer.Option(
-            help="All positions whatever the orientation, some coordinates over fixed others, or all positions for "
-            "a lattice of leg lengths; by default a slice if coordinates vary.",
+            help="All positions whatever the orientation, some coordinates over fixed others, or all "
+            "positions for a lattice of leg lengths; by default a slice if coordinates vary.",
         ),
     ] = None,
     vary: Annotated[

@@ -157,8 +157,8 @@ def _workspace_summary(found: Section4) -> str:
 
 {as_markdown(facts)}
 
-`fig3.png` shows the first, coloured by what ends it. Its volume is {flood["volume"]:.3f} m³, give or take
-{100 * flood["volume_error"] / flood["volume"]:.1g} %. The paper steps the lengths by 10 mm, which takes longer.
+`fig3.png` shows the first, coloured by what ends it. Its volume is {flood["volume"]:.3f} m³,
+give or take {100 * flood["volume_error"] / flood["volume"]:.1g} %. The paper steps the lengths by 10 mm, which takes longer.
 """
 
 

@@ -12,11 +12,15 @@ from polypod import _core
 from polypod.errors import CoordinateError, WorkspaceError, alternatives
 from polypod.mechanism import Mechanism
 from polypod.singularity import NEAR_SINGULAR
+from polypod.status import Status
 
 Array = NDArray[np.float64]
 
 MOST_NODES = 10**9
 """Nodes of the largest grid; its mask takes 1 GB."""
+
+ON_LIMIT = 1e-9
+"""By how much, in its unit, a start pose may pass a limit: poses found on one miss it by rounding."""
 
 _CANDIDATES = 7
 """Places along each axis at which a start pose is looked for."""
@@ -185,10 +189,8 @@ def checked_start(mech: Mechanism, start: ArrayLike) -> Array:
     if pose.shape != (4, 4):
         raise WorkspaceError(f"start has the shape {pose.shape}; needs one pose, (4, 4)")
     limits = mech.limits(pose)
-    if not bool(limits.within):
-        from polypod.status import Status
-
-        status = Status(int(limits.status))
+    status = Status(int(limits.status))
+    if not status.has_answer or limits.margins.min(initial=np.inf) < -ON_LIMIT:
         why = (
             f"passes a limit: {limits.names[int(limits.binding)]}"
             if status.has_answer and limits.binding >= 0
@@ -201,9 +203,9 @@ def checked_start(mech: Mechanism, start: ArrayLike) -> Array:
 def find_start(mech: Mechanism, bounds: Array, *, regular: bool) -> Array:
     """(4, 4): a pose inside all limits, o in the bounds (3, 2).
 
-    The centre pose if it is such a one; else the nearest found, at 7 x 7 x 7 places and home, with rotations
-    next to that of home and to six turned from it by 0.3 rad. With `regular`, if that is nearly singular, the
-    pose found that is conditioned best.
+    The centre pose if it is such a one; else of those found at 7 x 7 x 7 places and home, with rotations next to
+    that of home and to six turned from it by 0.3 rad, the one farthest from its limits, relative to their
+    scales. With `regular`, if the centre pose is nearly singular, the one that is conditioned best.
 
     Raises WorkspaceError where none is found.
     """
@@ -227,11 +229,15 @@ def find_start(mech: Mechanism, bounds: Array, *, regular: bool) -> Array:
             f"start: no pose of {mech.name} inside all limits was found in the bounds; give one, or other "
             "bounds"
         )
-    if regular:
-        sigma = mech.conditioning(fitted).sigma_min
-        if not sigma[0] > NEAR_SINGULAR:
-            return np.asarray(fitted[int(np.nanargmax(sigma))])
-    return np.asarray(fitted[0])
+    home_serves = bool(mech.limits(home).within) and np.array_equal(places[0], home[:3, 3])
+    if home_serves and not (regular and mech.conditioning(home).sigma_min < NEAR_SINGULAR):
+        return home
+    room = (
+        mech.conditioning(fitted).sigma_min
+        if regular
+        else mech.limits(fitted).relative.min(axis=1, initial=1.0)
+    )
+    return np.asarray(fitted[int(np.argmax(np.nan_to_num(room, nan=-np.inf)))])
 
 
 def _turned(axis: int, angle: float) -> Array:
