@@ -142,7 +142,8 @@ curves are in a figure without numbers; this motion is Polypod's.
 
 ## What to look at next
 
-- `fig4.png`: the panels of Fig. 4; `poses.png`: Fig. 1a, c-e; `topology.png`: Fig. 1b; all as SVG, too
+- `fig3.png`: Fig. 3; `fig4.png`: the panels of Fig. 4; `poses.png`: Fig. 1a, c-e; `topology.png`: Fig. 1b;
+  all as SVG, too
 - `solution.nc`, `solution.csv`: every quantity with its unit; `polypod.load_solution` reads both
 - `polypod info {facts["name"]}`: freedoms, constraints, conditioning, warnings
 - `polypod solve {facts["name"]} your-motion.csv -o result.nc`: your own motion
@@ -152,13 +153,14 @@ curves are in a figure without numbers; this motion is Polypod's.
 def _workspace_summary(found: Section4) -> str:
     facts = found.facts()
     flood = facts["flood"]
+    share = 100 * flood["volume_error"] / flood["volume"]
     return f"""
 ## Workspace of Section 4
 
 {as_markdown(facts)}
 
-`fig3.png` shows the first, coloured by what ends it. Its volume is {flood["volume"]:.3f} m³,
-give or take {100 * flood["volume_error"] / flood["volume"]:.1g} %. The paper steps the lengths by 10 mm, which takes longer.
+`fig3.png` shows the first, coloured by what ends it. Its volume is
+{flood["volume"]:.3f} m³, give or take {share:.1g} %. The paper steps the lengths by 10 mm; that takes longer.
 """
 
 

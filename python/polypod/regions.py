@@ -203,8 +203,8 @@ def checked_start(mech: Mechanism, start: ArrayLike) -> Array:
 def find_start(mech: Mechanism, bounds: Array, *, regular: bool) -> Array:
     """(4, 4): a pose inside all limits, o in the bounds (3, 2).
 
-    The centre pose if it is such a one; else of those found at 7 x 7 x 7 places and home, with rotations next to
-    that of home and to six turned from it by 0.3 rad, the one farthest from its limits, relative to their
+    The centre pose if it is such a one; else of those found at 7 x 7 x 7 places and home, with rotations next
+    to that of home and to six turned from it by 0.3 rad, the one farthest from its limits, relative to their
     scales. With `regular`, if the centre pose is nearly singular, the one that is conditioned best.
 
     Raises WorkspaceError where none is found.
