@@ -46,7 +46,7 @@ def test_version(run):
     assert run("--version") == (0, f"polypod {pp.__version__}\n", "")
 
 
-@pytest.mark.parametrize("command", ["demo", "info", "solve"])
+@pytest.mark.parametrize("command", ["demo", "info", "solve", "workspace"])
 def test_help_shows_an_example(run, command):
     status, out, _ = run(command, "--help")
     assert status == 0
@@ -329,3 +329,67 @@ def test_info_draws_the_mechanism(run, tmp_path):
     run("info", str(DATA / "3-rps.toml"), "--draw", str(figure))
     assert figure.read_bytes().startswith(b"\x89PNG")
     assert figure.stat().st_size > 10_000
+
+
+# --- workspace ----------------------------------------------------------------------------------------------
+
+
+def test_workspace_prints_tables_and_writes_files(run, tmp_path):
+    mesh, picture = tmp_path / "w.ply", tmp_path / "w.png"
+    status, out, err = run("workspace", NAME, "--step", "80mm", "-o", mesh, "--draw", picture)
+    assert (status, err) == (0, "")
+    assert "reachable workspace" in out
+    assert re.search(r"│ z +│ +0\.0 mm │ +[78]\d\d\.\d mm │", out)
+    assert re.search(r"volume: 0\.\d+ ± \S+ m\^3", out)
+    assert "stroke max of leg 1" in out
+    assert mesh.read_bytes().startswith(b"ply")
+    assert picture.read_bytes().startswith(b"\x89PNG")
+
+
+def test_workspace_as_json_is_that_of_python(run, tmp_path):
+    path = tmp_path / "w.nc"
+    args = ("--vary", "azimuth,tilt", "--fix", "x=0", "--fix", "y=100mm", "--fix", "z=0.7", "--step", "6deg")
+    status, out, _ = run("workspace", NAME, *args, "--bounds", "tilt=0:1.2", "-o", path, "--json")
+    assert status == 0
+    found = pp.load(NAME).workspace(
+        ["azimuth", "tilt"],
+        {"x": 0.0, "y": 0.1, "z": 0.7},
+        step=np.radians(6),
+        bounds={"tilt": (0.0, 1.2)},
+    )
+    assert json.loads(out) == found.facts()
+    assert pp.load_workspace(path) == found
+
+
+def test_workspace_by_a_lattice(run):
+    status, out, _ = run("workspace", NAME, "--kind", "lattice", "--step", "100mm", "--json")
+    assert status == 0
+    assert json.loads(out)["nodes"] == 3**5
+    status, out, _ = run("workspace", NAME, "--kind", "lattice", "--step", "100mm")
+    assert "243 combinations" in out
+
+
+@pytest.mark.parametrize(
+    ("args", "message"),
+    [
+        (("--step", "0"), "step of x is 0.0"),
+        (("--step", "2 parsecs"), "--step: 'parsecs' is no unit"),
+        (("--step", "wide"), "--step is 'wide'"),
+        (("--kind", "slice"), "needs --vary"),
+        (("--kind", "lattice", "-o", "w.stl"), "--output is not for --kind lattice"),
+        (("--fix", "x=0"), "--fix is for slices"),
+        (("--vary", "x,y,z", "--fix", "alpha"), "--fix is 'alpha'; must be name=value"),
+        (("--vary", "x,y,q", "--fix", "alpha=0"), "'q' is none"),
+        (("--bounds", "z=3"), "--bounds is 'z=3'; must be name=from:to"),
+        (("-o", "w.obj"), "w.obj ends in '.obj'"),
+        (("-o", "nowhere/w.stl"), "nowhere is no directory"),
+        (("--draw", "w.pdf"), "w.pdf ends in '.pdf'"),
+        (("--vary", "alpha,beta", "-o", "w.stl"), "has no mesh"),
+        (("--threads", "-2"), "threads is -2"),
+    ],
+)
+def test_workspace_says_what_is_wrong(run, args, message):
+    status, out, err = run("workspace", NAME, *args)
+    assert (status, out) == (2, "")
+    assert err.startswith("polypod: ")
+    assert message in err

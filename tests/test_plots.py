@@ -273,3 +273,25 @@ def test_unknown_suffix(tmp_path):
 
 def test_palette_is_distinct():
     assert len(set(PALETTE)) == len(PALETTE) == 7
+
+
+# --- workspaces ---------------------------------------------------------------------------------------------
+
+
+def test_four_views_of_a_workspace_and_an_outline(tmp_path):
+    mech = pp.load("lu-3spu-2rpu-r")
+    solid = plots.plot_workspace(mech.workspace(step=0.08), Figure(figsize=(8.0, 7.4)))
+    titles = [ax.get_title(loc="left") for ax in solid.axes]
+    assert titles == ["(a)  top view", "(b)  side view", "(c)  front view", "(d)  isometric view"]
+    top, side, front, _ = solid.axes
+    assert top.get_xlabel() == "$X_o$ / mm"
+    assert side.get_xlabel() == "$Y_o$ / mm"
+    assert front.get_ylabel() == "$Z_o$ / mm"
+    names = [text.get_text() for text in solid.legends[0].get_texts()]
+    assert {f"stroke {end} of leg {leg}" for end in ("min", "max") for leg in range(1, 6)} <= {*names}
+    outline = mech.workspace(["azimuth", "tilt"], {"x": 0.0, "y": 0.1, "z": 0.7}, step=0.1)
+    flat = plots.plot_workspace(outline, Figure(figsize=(5.6, 5.2)))
+    assert flat.axes[0].get_ylabel() == "tilt / deg"
+    assert flat.axes[0].get_ylim()[1] == pytest.approx(55.7, abs=5.0)
+    for i, figure in enumerate((solid, flat)):
+        plots.save_figure(figure, tmp_path / f"{i}.svg")

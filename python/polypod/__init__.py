@@ -20,6 +20,7 @@ from polypod.errors import (
     SolutionError,
     UnknownNameError,
     UnsupportedError,
+    WorkspaceError,
 )
 from polypod.mechanism import Mechanism, list_mechanisms, load
 from polypod.singularity import SingularityKind
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
     from polypod.motion import Motion, load_motion
     from polypod.results import Solution, load_solution
     from polypod.solution import solve
+    from polypod.workspace import Workspace, load_workspace
 
 # Motions and results need scipy and xarray, which take their time to load: only who uses them waits for them.
 _LATER = {
@@ -37,6 +39,8 @@ _LATER = {
     "Solution": "results",
     "load_solution": "results",
     "solve": "solution",
+    "Workspace": "workspace",
+    "load_workspace": "workspace",
     "plots": "plots",
 }
 
@@ -55,12 +59,15 @@ __all__ = [
     "Status",
     "UnknownNameError",
     "UnsupportedError",
+    "Workspace",
+    "WorkspaceError",
     "__version__",
     "errors",
     "list_mechanisms",
     "load",
     "load_motion",
     "load_solution",
+    "load_workspace",
     "solve",
 ]
 

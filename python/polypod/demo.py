@@ -16,6 +16,7 @@ from polypod.mechanism import Mechanism, load
 from polypod.motion import load_motion
 from polypod.paper import fit_markdown, fit_table_i, table_i
 from polypod.results import Solution
+from polypod.section4 import Section4, as_markdown, section4
 from polypod.solution import solve
 from polypod.summary import describe, summarise
 
@@ -65,7 +66,12 @@ def run_demo(directory: str | PathLike[str]) -> Demo:
         for suffix in (".png", ".svg"):
             plots.save_figure(figure, directory / (name + suffix))
             files.append(name + suffix)
-    text = _summary(facts, path, _table_i(mech))
+    found = section4(mech)
+    views = plots.plot_workspace(found.flood, Figure(figsize=(8.0, 7.4)))
+    for suffix in (".png", ".svg"):
+        plots.save_figure(views, directory / f"fig3{suffix}")
+        files.append(f"fig3{suffix}")
+    text = _summary(facts, path, _table_i(mech)) + _workspace_summary(found)
     (directory / "summary.md").write_text(text, encoding="utf-8")
     return Demo(directory, (*files, "summary.md"), facts, path, text)
 
@@ -138,7 +144,8 @@ curves are in a figure without numbers; this motion is Polypod's.
 
 ## What to look at next
 
-- `fig4.png`: the panels of Fig. 4; `poses.png`: Fig. 1a, c-e; `topology.png`: Fig. 1b; all as SVG, too
+- `fig3.png`: Fig. 3; `fig4.png`: the panels of Fig. 4; `poses.png`: Fig. 1a, c-e; `topology.png`: Fig. 1b;
+  all as SVG, too
 - `solution.nc`, `solution.csv`: every quantity with its unit; `polypod.load_solution` reads both
 - `polypod info {facts["name"]}`: freedoms, constraints, conditioning, warnings
 - `polypod solve {facts["name"]} your-motion.csv -o result.nc`: your own motion
@@ -162,6 +169,20 @@ Of {count.min()} to {count.max()} assembly modes in each row, the one above the 
 - Fitted: e = {e:.1f}, E_1 = {on_rod:.1f}, E_2 = {other:.1f} mm; then {rms[1]:.2f}° rms,
   {largest[1]:.2f}° at most.
 - Row 1 is not symmetric, r_1 and r_3 differ by {skew:.2f} mm; yet φ_zX = 90° is printed.
+"""
+
+
+def _workspace_summary(found: Section4) -> str:
+    facts = found.facts()
+    flood = facts["flood"]
+    share = 100 * flood["volume_error"] / flood["volume"]
+    return f"""
+## Workspace of Section 4
+
+{as_markdown(facts)}
+
+`fig3.png` shows the first, coloured by what ends it. Its volume is
+{flood["volume"]:.3f} m³, give or take {share:.1g} %. The paper steps the lengths by 10 mm; that takes longer.
 """
 
 

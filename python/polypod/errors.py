@@ -61,6 +61,10 @@ class SolutionError(PolypodError):
     """A file of results that cannot be read or written."""
 
 
+class WorkspaceError(PolypodError):
+    """A workspace that cannot be made, read or written."""
+
+
 class CoordinateError(PolypodError):
     """Coordinates that make up no coordinate set of the mechanism."""
 

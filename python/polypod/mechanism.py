@@ -5,10 +5,10 @@ from __future__ import annotations
 import copy
 import json
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from importlib.resources import files
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import tomli_w
@@ -42,6 +42,7 @@ from polypod.errors import (
     ShapeError,
     UnknownNameError,
     UnsupportedError,
+    WorkspaceError,
     alternatives,
 )
 from polypod.schema import read_spec
@@ -55,6 +56,10 @@ from polypod.singularity import (
 )
 from polypod.status import Status
 from polypod.units import readable
+
+if TYPE_CHECKING:
+    from polypod.lattice import LengthLattice
+    from polypod.workspace import Workspace
 
 
 class Mechanism:
@@ -581,6 +586,117 @@ class Mechanism:
             padded[name][present] = column
         padded["mode_status"] = padded.pop("status")
         return AssemblyModes(**_shaped({**padded, "number": count, "status": status}, shape))
+
+    # --- workspace ---------------------------------------------------------------------------------------
+
+    def workspace(
+        self,
+        vary: Sequence[str] | None = None,
+        fix: Mapping[str, float] | None = None,
+        *,
+        step: float | Mapping[str, float] | None = None,
+        bounds: Mapping[str, Sequence[float]] | None = None,
+        start: ArrayLike | None = None,
+        branch: int = +1,
+        keep_aspect: bool = False,
+        sigma_min: float | None = None,
+        threads: int = 0,
+        progress: Callable[[int, int], None] | None = None,
+    ) -> Workspace:
+        """The reachable workspace [T39, T40], or with `vary` a slice of the pose space [T42].
+
+        The reachable workspace is the set of positions of o that can be reached from a start pose inside all
+        limits, whatever the orientation. It is found in steps from neighbour to neighbour: what is found can
+        be reached; what would need a rotation far from all those nearby may be missing.
+
+        A slice varies two or three coordinates over fixed others: x, y, z over given angles are the
+        constant-orientation workspace, angles over a given position the orientation workspace. The names
+        are those of one coordinate set; or x, y, z of the tool tip with azimuth, tilt and (six freedoms)
+        torsion of the tool axis. It holds the connected part with the start, else the largest.
+
+        Args:
+            vary: two or three coordinates; without them the reachable workspace.
+            fix: values of the others that the coordinate set takes, m and rad.
+            step: width of the grid's cells, m or rad; for a slice also one for each coordinate. By default
+                the widest bounds have 64 cells; those of a slice have 60 each, or 200 in two dimensions.
+            bounds: least and greatest value by name. By default positions that the strokes allow, on the side
+                of the base joints where home is, and full turns.
+            start: pose (4, 4) inside all limits; by default one found from home. A slice takes from it the
+                component, the aspect and the branch of dependent coordinates.
+            branch: as for `state`; slices only.
+            keep_aspect: only what is reached without a change of the sign of det J.
+            sigma_min: a floor for the smallest singular value: the dexterous workspace.
+            threads: 0 for all cores; reachable workspace only. The result does not depend on it.
+            progress: called with the number of nodes done and of all.
+
+        Raises:
+            WorkspaceError: bounds, step or start that are wrong, and where nothing is found.
+            CoordinateError: names that make up no coordinate set.
+
+        >>> import polypod as pp
+        >>> mech = pp.load("lu-3spu-2rpu-r")
+        >>> found = mech.workspace(step=0.1)
+        >>> found.volume_unit, 0.3 < found.volume < 0.4
+        ('m^3', True)
+        >>> tilts = mech.workspace(["azimuth", "tilt"], {"x": 0.0, "y": 0.1, "z": 0.7}, step=0.1)
+        >>> tilts.mask.shape
+        (63, 31)
+        """
+        from polypod.reachable import reachable
+        from polypod.slices import sliced
+
+        given: dict[str, Any] = {
+            "step": step,
+            "bounds": bounds,
+            "start": start,
+            "keep_aspect": keep_aspect,
+            "sigma_min": sigma_min,
+            "progress": progress,
+        }
+        if vary is not None:
+            return sliced(self, vary, fix, branch=branch, **given)
+        if fix:
+            raise WorkspaceError(f"fix.{next(iter(fix))}: needs coordinates that vary; give vary, too")
+        return reachable(self, threads=threads, **given)
+
+    def length_lattice(
+        self,
+        *,
+        step: float | None = None,
+        layer: float | None = None,
+        start: ArrayLike | None = None,
+        sigma_min: float | None = None,
+        threads: int = 0,
+        progress: Callable[[int, int], None] | None = None,
+    ) -> LengthLattice:
+        """Positions of o for all combinations of leg lengths in one assembly mode [T41].
+
+        The way of the paper's Section 4: every actuated leg takes lengths from the least to the greatest of
+        its stroke, and forward kinematics continues from each combination to the next.
+
+        Args:
+            step: of the lengths, m; a tenth of the shortest stroke by default.
+            layer: height of the layers of z for which widths are kept, m; `step` by default.
+            start: pose (4, 4) whose mode is meant; by default a well conditioned one found from home.
+            sigma_min: a floor for the smallest singular value.
+            threads: 0 for all cores. The result does not depend on it.
+            progress: called with the number of nodes done and of all.
+
+        Raises:
+            UnsupportedError: an actuated leg without a stroke, or not as many of them as freedoms.
+            WorkspaceError: a step or start that is wrong.
+        """
+        from polypod.lattice import length_lattice
+
+        return length_lattice(
+            self,
+            step=step,
+            layer=layer,
+            start=start,
+            sigma_min=sigma_min,
+            threads=threads,
+            progress=progress,
+        )
 
     # --- dynamics ----------------------------------------------------------------------------------------
 

@@ -1,4 +1,4 @@
-"""Figures: the mechanism in space, the curves of the paper's Fig. 4, the topology graph of its Fig. 1b.
+"""Figures: the mechanism in space, workspaces, the paper's Fig. 4, the topology graph of its Fig. 1b.
 
 Each function draws on the axes or figure that it is given, or makes them with pyplot; none shows or saves.
 """
@@ -28,6 +28,7 @@ from polypod.scene import Scene, draw, frame, joint_handles, math_name
 from polypod.status import Status, count
 from polypod.style import BLUE, GREY, INK, PALE, color_of, dash_of, house_style
 from polypod.summary import link_kind, links_by_joints
+from polypod.workspace_plot import plot_workspace as plot_workspace
 
 Array = NDArray[np.float64]
 

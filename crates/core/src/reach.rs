@@ -115,17 +115,28 @@ fn forces_at_rest(mech: &Mechanism, pose: &Pose<f64>) -> [f64; 6] {
     dynamics::inverse_dynamics(mech, &rest, load).0
 }
 
-/// The limit that is nearest at a pose, relative to its scale, and its margin in its own unit.
-#[must_use]
-pub fn nearest_limit(mech: &Mechanism, pose: &Pose<f64>) -> Option<(usize, f64)> {
+/// The margins of all limits at a pose, each in its own unit.
+fn margins<'a>(mech: &'a Mechanism, pose: &'a Pose<f64>) -> impl Iterator<Item = (&'a Limit, f64)> {
     let forces = mech
         .limits
         .iter()
         .any(|l| matches!(l.measure, Measure::Force { .. }))
         .then(|| forces_at_rest(mech, pose));
-    let margins = mech.limits.iter().map(|l| (l.margin(mech, pose, forces.as_ref()), l.scale));
-    margins
+    mech.limits.iter().map(move |l| (l, l.margin(mech, pose, forces.as_ref())))
+}
+
+/// The limit that is nearest at a pose, relative to its scale, and its margin in its own unit.
+#[must_use]
+pub fn nearest_limit(mech: &Mechanism, pose: &Pose<f64>) -> Option<(usize, f64)> {
+    let relative = |(limit, margin): (&Limit, f64)| margin / limit.scale;
+    margins(mech, pose)
         .enumerate()
-        .min_by(|(_, a), (_, b)| (a.0 / a.1).total_cmp(&(b.0 / b.1)))
-        .map(|(i, (margin, _))| (i, margin))
+        .min_by(|(_, a), (_, b)| relative(*a).total_cmp(&relative(*b)))
+        .map(|(i, (_, margin))| (i, margin))
+}
+
+/// The first limit whose margin is at most `near`, in its own unit.
+#[must_use]
+pub fn first_limit(mech: &Mechanism, pose: &Pose<f64>, near: f64) -> Option<usize> {
+    margins(mech, pose).position(|(_, margin)| margin <= near)
 }

@@ -8,10 +8,10 @@ use rayon::prelude::*;
 use crate::jacobian::scaled_jacobian;
 use crate::linear::solve;
 use crate::mechanism::Mechanism;
-use crate::reach::{fit, nearest_limit};
+use crate::reach::{first_limit, fit, nearest_limit};
 use crate::spatial::{Mat3, Pose, Vec3};
 
-/// A cubic grid; its nodes are counted with z fastest.
+/// A cubic grid; its nodes, the middles of cubic cells, are counted with z fastest.
 #[derive(Clone, Copy, Debug)]
 pub struct Grid {
     pub origin: Vec3<f64>,
@@ -24,6 +24,12 @@ const DIRECTIONS: [[i64; 3]; 6] = [[-1, 0, 0], [1, 0, 0], [0, -1, 0], [0, 1, 0],
 
 /// Pieces of the way between two nodes.
 const PIECES: u32 = 5;
+
+/// Pieces in which a neighbour is tried once more that was not reached in one.
+const SMALL_PIECES: u32 = 16;
+
+/// Nodes are the middles of cells: where the grid ends, so does the last cell.
+const HALF_CELL: f64 = 0.5;
 
 /// How exactly the boundary is found on an edge, m.
 const EXACT: f64 = 1e-12;
@@ -138,26 +144,62 @@ impl Flood {
         self.fresh.len()
     }
 
-    /// Where the boundary cuts the edges between reached and unreached nodes, in the order of the reached ones.
-    #[must_use]
-    pub fn edges(&self, mech: &Mechanism) -> Vec<Edge> {
-        let open: Vec<(usize, usize, Mat3<f64>)> = self
-            .rotations
+    /// Tries every unreached neighbour of the reached nodes once more, in small pieces of the way; the number of new
+    /// ones. From them waves may go on.
+    pub fn retry(&mut self, mech: &Mechanism) -> usize {
+        let open = self.open();
+        let found: BTreeMap<usize, Mat3<f64>> = open
+            .par_iter()
+            .filter_map(|&(node, d, rotation)| {
+                let (from, to) = (self.grid.place(node), self.grid.neighbour(node, d));
+                let beyond = self.grid.node(to)?;
+                let (from, to) = (self.grid.point(from), self.grid.point(to));
+                let mut pose = Pose { rotation, o: from };
+                for k in 1..=SMALL_PIECES {
+                    let t = f64::from(k) / f64::from(SMALL_PIECES);
+                    pose = moved(mech, &pose, from * (1.0 - t) + to * t, self.sign)?;
+                }
+                Some((beyond, pose.rotation))
+            })
+            .collect();
+        for (&node, &rotation) in &found {
+            self.mask[node] = true;
+            self.rotations.insert(node, rotation);
+        }
+        self.fresh = found.into_keys().collect();
+        self.fresh.len()
+    }
+
+    /// The edges between reached and unreached nodes, those out of the grid too: reached node, direction, rotation.
+    fn open(&self) -> Vec<(usize, usize, Mat3<f64>)> {
+        self.rotations
             .iter()
             .flat_map(|(&node, &rotation)| (0..6).map(move |d| (node, d, rotation)))
             .filter(|&(node, d, _)| {
                 self.grid.node(self.grid.neighbour(node, d)).is_none_or(|n| !self.mask[n])
             })
-            .collect();
+            .collect()
+    }
+
+    /// Where the boundary cuts the edges between reached and unreached nodes, in the order of the reached ones.
+    #[must_use]
+    pub fn edges(&self, mech: &Mechanism) -> Vec<Edge> {
+        let open = self.open();
         open.par_iter().map(|&(node, d, rotation)| self.edge(mech, node, d, rotation)).collect()
     }
 
     /// Bisects an edge for the last place that can be reached from its inner node.
     fn edge(&self, mech: &Mechanism, node: usize, direction: usize, rotation: Mat3<f64>) -> Edge {
         let inner = self.grid.point(self.grid.place(node));
-        let way = self.grid.point(self.grid.neighbour(node, direction)) - inner;
+        let next = self.grid.neighbour(node, direction);
+        let way = self.grid.point(next) - inner;
+        let ends = self.grid.node(next).is_none();
+        let whole = if ends { HALF_CELL } else { 1.0 };
         let mut pose = Pose { rotation, o: inner };
-        let (mut low, mut high) = (0.0, 1.0);
+        let (mut low, mut high) = (0.0, whole);
+        if let Some(last) = moved(mech, &pose, inner + way * whole, self.sign) {
+            (pose, low) = (last, whole);
+        }
         while (high - low) * self.grid.step > EXACT {
             let middle = 0.5 * (low + high);
             match moved(mech, &pose, inner + way * middle, self.sign) {
@@ -165,15 +207,16 @@ impl Flood {
                 None => high = middle,
             }
         }
-        let nearest = nearest_limit(mech, &pose);
+        let binding = first_limit(mech, &pose, AT_LIMIT);
         let beyond = || fit(mech, &pose, inner + way * high);
-        let stop = match (nearest, self.sign) {
-            _ if high >= 1.0 && self.grid.node(self.grid.neighbour(node, direction)).is_none() => Stop::Grid,
-            (Some((limit, margin)), _) if margin <= AT_LIMIT => Stop::Limit(limit),
+        let stop = match (binding, self.sign) {
+            _ if ends && low >= whole - EXACT / self.grid.step => Stop::Grid,
+            (Some(limit), _) => Stop::Limit(limit),
             (_, Some(kept)) if beyond().is_none_or(|p| sign(mech, &p) != kept) => Stop::Singularity,
             _ => Stop::Search,
         };
-        Edge { node, direction, share: low, pose, stop, margin: nearest.map_or(f64::NAN, |(_, m)| m) }
+        let margin = nearest_limit(mech, &pose).map_or(f64::NAN, |(_, margin)| margin);
+        Edge { node, direction, share: low, pose, stop, margin }
     }
 }
 
@@ -195,6 +238,7 @@ pub struct Edge {
 /// What keeps the platform from going further.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stop {
+    /// On the boundary several limits may bind at once: the first of them in the mechanism's order.
     Limit(usize),
     /// Beyond, the sign of det J would change.
     Singularity,

@@ -479,6 +479,7 @@ fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add("__version__", env!("CARGO_PKG_VERSION"))?;
     m.add("Faults", m.py().get_type::<Faults>())?;
     m.add_class::<PyMechanism>()?;
+    m.add_function(wrap_pyfunction!(workspace::fit_poses, m)?)?;
     m.add_class::<workspace::PyFlood>()?;
     m.add_class::<workspace::PyLattice>()?;
     m.add_function(wrap_pyfunction!(zeros, m)?)?;

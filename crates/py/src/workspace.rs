@@ -1,9 +1,10 @@
 //! Searches of the workspace, one wave at a time, so that the caller can show progress and stop.
 
-use numpy::{PyArray1, PyArrayMethods};
+use numpy::{PyArray1, PyArray3, PyArrayMethods};
 use polypod_core::batch::pose_of;
 use polypod_core::lattice::Lattice;
-use polypod_core::spatial::Vec3;
+use polypod_core::reach::fit;
+use polypod_core::spatial::{Pose, Vec3};
 use polypod_core::workspace::{Flood, Grid, Stop};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -25,9 +26,34 @@ fn pool(threads: usize) -> PyResult<ThreadPool> {
         .map_err(|e| PyValueError::new_err(format!("threads: {e}")))
 }
 
-fn start_pose(start: &Array<'_>) -> PyResult<polypod_core::spatial::Pose<f64>> {
+fn start_pose(start: &Array<'_>) -> PyResult<Pose<f64>> {
     let start = slice(start)?;
     if start.len() == 16 { Ok(pose_of(start)) } else { Err(PyValueError::new_err("needs one start pose")) }
+}
+
+fn matrix_of(pose: &Pose<f64>) -> [f64; 16] {
+    let ([x, y, z], o) = (pose.rotation.rows(), pose.o.array());
+    let row = |r: [f64; 3], o: f64| [r[0], r[1], r[2], o];
+    let rows = [row(x, o[0]), row(y, o[1]), row(z, o[2]), [0.0, 0.0, 0.0, 1.0]];
+    std::array::from_fn(|i| rows[i / 4][i % 4])
+}
+
+/// The poses (n, 4, 4) inside all limits next to given ones with the same o; NaN where the search finds none.
+#[pyfunction]
+pub fn fit_poses<'py>(
+    py: Python<'py>,
+    mech: &Bound<'py, PyMechanism>,
+    poses: Array<'py>,
+) -> PyResult<Bound<'py, PyArray3<f64>>> {
+    let poses = slice(&poses)?;
+    if poses.len() % 16 != 0 {
+        return Err(PyValueError::new_err("needs whole poses"));
+    }
+    let fitted = poses.chunks_exact(16).flat_map(|matrix| {
+        let pose = pose_of(matrix);
+        fit(mech.get().core(), &pose, pose.o).map_or([f64::NAN; 16], |pose| matrix_of(&pose))
+    });
+    PyArray1::from_vec(py, fitted.collect()).reshape([poses.len() / 16, 4, 4])
 }
 
 #[pyclass(name = "Flood")]
@@ -63,6 +89,12 @@ impl PyFlood {
         py.detach(|| pool.install(|| flood.wave(mech)))
     }
 
+    /// The number of nodes that are reached in smaller steps only; waves may go on from them.
+    fn retry(&mut self, py: Python<'_>) -> usize {
+        let (mech, pool, flood) = (self.mech.get().core(), &self.pool, &mut self.flood);
+        py.detach(|| pool.install(|| flood.retry(mech)))
+    }
+
     /// Which nodes are reached, flat, z fastest.
     fn mask<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<bool>> {
         PyArray1::from_slice(py, &self.flood.mask)
@@ -78,14 +110,7 @@ impl PyFlood {
             Stop::Grid => GRID,
             Stop::Search => SEARCH,
         };
-        let mut poses = Vec::with_capacity(16 * edges.len());
-        for edge in &edges {
-            let (r, o) = (edge.pose.rotation.rows(), edge.pose.o.array());
-            for k in 0..3 {
-                poses.extend_from_slice(&[r[k][0], r[k][1], r[k][2], o[k]]);
-            }
-            poses.extend_from_slice(&[0.0, 0.0, 0.0, 1.0]);
-        }
+        let poses: Vec<f64> = edges.iter().flat_map(|edge| matrix_of(&edge.pose)).collect();
         let n = edges.len();
         let result = PyDict::new(py);
         result.set_item("node", PyArray1::from_vec(py, edges.iter().map(|e| e.node as i64).collect()))?;

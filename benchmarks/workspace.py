@@ -1,0 +1,79 @@
+"""Times and peak memory of workspaces: the paper's lattice of lengths, a million voxels, assembly modes.
+
+Each row runs in a process of its own, so that its peak memory is its own.
+"""
+
+import resource
+import subprocess
+import sys
+from time import perf_counter
+
+import numpy as np
+
+import polypod as pp
+from polypod import _core
+
+NAME = "lu-3spu-2rpu-r"
+STEP = 0.0131
+COUNTS = (115, 115, 77)
+
+
+def lattice():
+    """The paper's Section 4: steps of 10 mm, 21^5 combinations."""
+    found = pp.load(NAME).length_lattice(step=0.01)
+    return {f"lattice of {found.nodes} lengths": None}
+
+
+def voxels():
+    """The flood of a grid and the exact boundary, apart."""
+    mech = pp.load(NAME)
+    origin = [-0.5 * STEP * (COUNTS[0] - 1), -0.5 * STEP * (COUNTS[1] - 1), 0.5 * STEP]
+    start = perf_counter()
+    flood = _core.Flood.begin(mech._core, origin, STEP, COUNTS, mech.home.ravel(), False, 0)
+    while flood.wave() or flood.retry():
+        pass
+    flooded = perf_counter() - start
+    edges = len(flood.edges()["node"])
+    return {
+        f"flood of {np.prod(COUNTS)} voxels": flooded,
+        f"its boundary: {edges} edges": perf_counter() - start - flooded,
+    }
+
+
+def meshed():
+    """The same from Python with mesh, volume and error."""
+    found = pp.load(NAME).workspace(step=STEP)
+    return {f"workspace of {found.mask.size} voxels with mesh": None}
+
+
+def modes():
+    """Assembly modes for some sets of lengths."""
+    mech = pp.load(NAME)
+    lengths = np.random.default_rng(0).uniform(0.65, 0.85, (20, 5))
+    mech.assembly_modes(lengths[0])
+    start = perf_counter()
+    for row in lengths:
+        mech.assembly_modes(row)
+    return {"assembly modes, one set of lengths": (perf_counter() - start) / len(lengths)}
+
+
+RUNS = {"lattice": lattice, "voxels": voxels, "meshed": meshed, "modes": modes}
+
+
+def measure(name):
+    start = perf_counter()
+    rows = RUNS[name]()
+    whole = perf_counter() - start
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024  # kB on Linux
+    for text, seconds in rows.items():
+        print(f"{text:48}{whole if seconds is None else seconds:10.3f} s{peak:10.0f} MB")
+
+
+def main():
+    print(f"{'':48}{'time':>12}{'peak':>13}", flush=True)
+    for name in RUNS:
+        subprocess.run([sys.executable, __file__, name], check=True)
+
+
+if __name__ == "__main__":
+    measure(sys.argv[1]) if len(sys.argv) > 1 else main()

@@ -1,0 +1,139 @@
+"""The reachable workspace from a lattice of leg lengths, as in Section 4 of the paper [T41]."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from polypod import _core
+from polypod.errors import UnsupportedError, WorkspaceError
+from polypod.mechanism import Mechanism
+from polypod.regions import checked_start, find_start, position_bounds
+from polypod.workspace import with_floor
+
+Array = NDArray[np.float64]
+Progress = Callable[[int, int], None]
+
+DIVISIONS = 10
+"""Steps of the shortest stroke by default."""
+
+MOST_NODES = 4 * 10**9
+
+
+@dataclass(frozen=True, eq=False)
+class LengthLattice:
+    """Positions of o for all combinations of leg lengths in one assembly mode [T41].
+
+    Memory: one byte for each node.
+    """
+
+    step: float
+    """Of the lengths, m."""
+    nodes: int
+    """Of the lattice."""
+    inside: int
+    """Nodes with a pose inside all limits."""
+    beyond_limits: int
+    """Nodes with a pose that passes a limit other than a stroke."""
+    ends: int
+    """Steps to a neighbour on the way to which the mode ends."""
+    extents: Array
+    """(3, 2): least and greatest x, y, z of o, m."""
+    layers: Array
+    """(k, 2): lower and upper end of each layer of z, m; only layers that hold a position."""
+    profile: Array
+    """(k, 4): least and greatest x, then y, in each layer, m."""
+    inputs: dict[str, Any]
+    """What it was made from."""
+
+    def widths_above(self, z: float) -> Array:
+        """(2,): extents along x and y of the layers whose middle is above z, m; NaN where there is none."""
+        above = self.profile[self.layers.mean(axis=1) > z]
+        if not len(above):
+            return np.full(2, np.nan)
+        return np.array([above[:, 1].max() - above[:, 0].min(), above[:, 3].max() - above[:, 2].min()])
+
+    def facts(self) -> dict[str, Any]:
+        """What is worth telling, as plain data: SI."""
+        return {
+            "kind": "lattice",
+            **self.inputs,
+            "nodes": self.nodes,
+            "inside": self.inside,
+            "beyond_limits": self.beyond_limits,
+            "ends": self.ends,
+            "extents": dict(zip("xyz", self.extents.tolist(), strict=True)),
+        }
+
+
+def length_lattice(
+    mech: Mechanism,
+    *,
+    step: float | None = None,
+    layer: float | None = None,
+    start: ArrayLike | None = None,
+    sigma_min: float | None = None,
+    threads: int = 0,
+    progress: Progress | None = None,
+) -> LengthLattice:
+    """The positions of o over a lattice of leg lengths; see `Mechanism.length_lattice`."""
+    mech = with_floor(mech, sigma_min)
+    if threads < 0:
+        raise WorkspaceError(f"threads is {threads!r}; must be 0 (all cores) or more")
+    strokes = mech.stroke[mech.actuated]
+    widths = np.ptp(strokes, axis=1)
+    for name, (least, greatest) in zip(np.array(mech.leg_names)[mech.actuated], strokes, strict=True):
+        if not (least > 0.0 and np.isfinite(greatest)):
+            raise UnsupportedError(
+                f"legs.{name}.stroke: a lattice of lengths needs the stroke of every actuated leg"
+            )
+    if int(mech.actuated.sum()) != mech.dof:
+        raise UnsupportedError(f"{mech.name}: a lattice of lengths needs as many actuated legs as freedoms")
+    step = float(widths.min() / DIVISIONS) if step is None else step
+    layer = step if layer is None else layer
+    for name, value in (("step", step), ("layer", layer)):
+        if not 0.0 < value < np.inf:
+            raise WorkspaceError(f"{name} is {value!r}; must be above 0 m")
+    nodes = float(np.prod(np.rint(widths / step) + 1.0))
+    if nodes > MOST_NODES:
+        raise WorkspaceError(f"step makes a lattice of {nodes:.3g} nodes; at most {MOST_NODES:.0e}: widen it")
+    if start is None:
+        pose = find_start(mech, position_bounds(mech), regular=True)
+    else:
+        pose = checked_start(mech, start)
+    lattice = _core.Lattice.begin(mech._core, np.ascontiguousarray(pose).reshape(-1), step, layer, threads)
+    if lattice is None:
+        raise WorkspaceError(
+            "start: its assembly mode has no pose with the lengths of the nearest node; give another"
+        )
+    done = 1
+    while new := lattice.wave():
+        done += new
+        if progress is not None:
+            progress(done, lattice.nodes)
+    found = lattice.reached()
+    bottom, height = found["layers"]
+    profile = found["profile"]
+    some = np.isfinite(profile[:, 0])
+    lower = bottom + height * np.arange(len(profile))[some]
+    return LengthLattice(
+        step=step,
+        nodes=lattice.nodes,
+        inside=found["inside"],
+        beyond_limits=found["outside"],
+        ends=found["ends"],
+        extents=found["extents"],
+        layers=np.stack([lower, lower + height], axis=1),
+        profile=profile[some],
+        inputs={
+            "mechanism": mech.name,
+            "step": step,
+            "layer": layer,
+            "start": pose.tolist(),
+            "sigma_min": sigma_min,
+        },
+    )

@@ -1,0 +1,247 @@
+"""Where a workspace is looked for: bounds, grids, and a pose to start from."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from polypod import _core
+from polypod.errors import CoordinateError, WorkspaceError, alternatives
+from polypod.mechanism import Mechanism
+from polypod.singularity import NEAR_SINGULAR
+from polypod.status import Status
+
+Array = NDArray[np.float64]
+
+MOST_NODES = 10**9
+"""Nodes of the largest grid; its mask takes 1 GB."""
+
+ON_LIMIT = 1e-9
+"""By how much, in its unit, a start pose may pass a limit: poses found on one miss it by rounding."""
+
+_CANDIDATES = 7
+"""Places along each axis at which a start pose is looked for."""
+
+_TURN = 0.3
+"""Turn from home, rad, of the other rotations with which it is looked for."""
+
+_POSITIONS = ("x", "y", "z", "tip_x", "tip_y", "tip_z")
+_LENGTHS = ("p", "h")
+_DIRECTIONS = ("axis_x", "axis_y", "axis_z")
+
+
+class Grid(NamedTuple):
+    """Cells that fill a box; their middles are the nodes."""
+
+    names: tuple[str, ...]
+    origin: Array
+    """(d,): the first node, m and rad."""
+    steps: Array
+    """(d,): width of a cell along each axis."""
+    counts: tuple[int, ...]
+
+    @property
+    def nodes(self) -> int:
+        """Their number."""
+        return int(np.prod([float(n) for n in self.counts]))
+
+    def axes(self) -> tuple[Array, ...]:
+        """The nodes' coordinates along each axis."""
+        return tuple(
+            o + s * np.arange(n) for o, s, n in zip(self.origin, self.steps, self.counts, strict=True)
+        )
+
+    def bounds(self) -> Array:
+        """(d, 2): ends of the box."""
+        low = self.origin - 0.5 * self.steps
+        return np.stack([low, low + self.steps * np.array(self.counts)], axis=1)
+
+
+def unit(name: str) -> str:
+    """The unit of a coordinate."""
+    lengths = name in _POSITIONS or name in _LENGTHS
+    return "m" if lengths else "1" if name in _DIRECTIONS else "rad"
+
+
+def position_bounds(mech: Mechanism) -> Array:
+    """(3, 2): a box that holds every reachable position of o on the side of the base where home is, m.
+
+    Leg i reaches no farther from B_i than its stroke and |m_i| together. Along the axis that is closest to
+    the normal of the plane of the base joints, the box begins at their middle. Infinite without strokes.
+    """
+    legs = mech.geometry["legs"]
+    base = np.array([leg["base"]["point"] for leg in legs])
+    reach = mech.stroke[:, 1] + np.linalg.norm([leg["platform"]["point"] for leg in legs], axis=1)
+    box = np.stack([(base - reach[:, None]).max(axis=0), (base + reach[:, None]).min(axis=0)], axis=1)
+    middle = base.mean(axis=0)
+    normal = np.linalg.svd(base - middle)[2][2]
+    axis = int(np.argmax(np.abs(normal)))
+    home = mech.home[axis, 3]
+    box[axis, 0 if home >= middle[axis] else 1] = middle[axis]
+    return box
+
+
+def bounds_of(
+    mech: Mechanism, names: Sequence[str], given: Mapping[str, Sequence[float]] | None
+) -> dict[str, tuple[float, float]]:
+    """Least and greatest value of each coordinate: the given ones, else what the mechanism can reach.
+
+    Angles go all around; a tilt goes from 0 to π. Raises WorkspaceError for bounds that make no interval, and
+    where there are no strokes to tell them.
+    """
+    given = given or {}
+    for name in given:
+        if name not in names:
+            raise CoordinateError(f"bounds: {name!r} does not vary; {alternatives(str(name), names)}")
+    box = position_bounds(mech)
+    tip = float(np.linalg.norm(mech.geometry["tool"]["point"]))
+    reach = float(np.abs(box).max())
+    result = {}
+    for name in names:
+        if name in given:
+            ends = given[name]
+        elif name in _POSITIONS:
+            low, high = box[_POSITIONS.index(name) % 3]
+            more = tip if name.startswith("tip") else 0.0
+            ends = (low - more, high + more)
+        elif name in _LENGTHS:
+            ends = (-reach, reach)
+        elif unit(name) == "1":
+            ends = (-1.0, 1.0)
+        else:
+            ends = (0.0 if name == "tilt" else -np.pi, np.pi)
+        low, high = _interval(name, ends)
+        if not np.isfinite([low, high]).all() and name not in given:
+            raise WorkspaceError(
+                f"bounds.{name}: {mech.name} has no strokes that bound it; give bounds, such as "
+                f"bounds={{{name!r}: (-0.5, 0.5)}}"
+            )
+        result[name] = (low, high)
+    return result
+
+
+def _interval(name: str, ends: Sequence[float]) -> tuple[float, float]:
+    try:
+        low, high = (float(end) for end in ends)
+    except (TypeError, ValueError):
+        raise WorkspaceError(f"bounds.{name} is {ends!r}; needs two numbers, least and greatest") from None
+    if not low < high:
+        raise WorkspaceError(f"bounds.{name} is {low:g} to {high:g}; must go from a number to a greater one")
+    return low, high
+
+
+def grid_of(
+    bounds: Mapping[str, tuple[float, float]],
+    step: float | Mapping[str, float] | None,
+    cells: int,
+    *,
+    cubic: bool = False,
+) -> Grid:
+    """The grid of cells of about `step` that fills the bounds.
+
+    Args:
+        bounds: of each coordinate.
+        step: of all coordinates, or of each.
+        cells: how many the bounds of each coordinate have without a step; the widest bounds if cubic.
+        cubic: keep `step` exactly and let the last cells reach beyond the upper bound, or beyond both where
+            these are symmetric about zero; else cells fit the bounds.
+    """
+    names = tuple(bounds)
+    if not isinstance(step, Mapping) and step is not None and len({unit(n) for n in names}) > 1:
+        raise WorkspaceError(
+            f"step is {step!r} for coordinates in different units; needs one for each: "
+            f"{', '.join(f'{n} in {unit(n)}' for n in names)}"
+        )
+    chosen = dict(step) if isinstance(step, Mapping) else dict.fromkeys(names, step)
+    for name in chosen:
+        if name not in names:
+            raise CoordinateError(f"step: {name!r} does not vary; {alternatives(str(name), names)}")
+    steps, counts, origin = [], [], []
+    for name, (low, high) in bounds.items():
+        width = chosen.get(name)
+        if width is None:
+            width = (max(b - a for a, b in bounds.values()) if cubic else high - low) / cells
+        if not (np.isfinite(width) and width > 0.0):
+            raise WorkspaceError(f"step of {name} is {width!r}; must be above 0 {unit(name)}")
+        if cubic:
+            count = max(int(np.ceil((high - low) / width - 1e-9)), 1)
+            low = -0.5 * count * width if abs(low + high) < 1e-9 else low
+        else:
+            count = max(round((high - low) / width), 1)
+            width = (high - low) / count
+        steps.append(width)
+        counts.append(count)
+        origin.append(low + 0.5 * width)
+    grid = Grid(names, np.array(origin), np.array(steps), tuple(counts))
+    if grid.nodes > MOST_NODES:
+        raise WorkspaceError(
+            f"step makes a grid of {grid.nodes:.3g} nodes; at most {MOST_NODES:.0e}: widen it"
+        )
+    return grid
+
+
+def checked_start(mech: Mechanism, start: ArrayLike) -> Array:
+    """A pose given to start from. Raises WorkspaceError unless it is one of the mechanism's."""
+    pose = np.asarray(start, dtype=np.float64)
+    if pose.shape != (4, 4):
+        raise WorkspaceError(f"start has the shape {pose.shape}; needs one pose, (4, 4)")
+    limits = mech.limits(pose)
+    status = Status(int(limits.status))
+    if not status.has_answer or limits.margins.min(initial=np.inf) < -ON_LIMIT:
+        why = (
+            f"passes a limit: {limits.names[int(limits.binding)]}"
+            if status.has_answer and limits.binding >= 0
+            else f"{status.name}: {status.message}"
+        )
+        raise WorkspaceError(f"start {why}; needs a pose inside all limits")
+    return pose
+
+
+def find_start(mech: Mechanism, bounds: Array, *, regular: bool) -> Array:
+    """(4, 4): a pose inside all limits, o in the bounds (3, 2).
+
+    The centre pose if it is such a one; else of those found at 7 x 7 x 7 places and home, with rotations next
+    to that of home and to six turned from it by 0.3 rad, the one farthest from its limits, relative to their
+    scales. With `regular`, if the centre pose is nearly singular, the one that is conditioned best.
+
+    Raises WorkspaceError where none is found.
+    """
+    home = mech.home
+    near = [low + (high - low) * (np.arange(_CANDIDATES) + 0.5) / _CANDIDATES for low, high in bounds]
+    grid = np.stack(np.meshgrid(*near, indexing="ij"), axis=-1).reshape(-1, 3)
+    places = np.concatenate([home[None, :3, 3], grid])
+    places = places[((places >= bounds[:, 0]) & (places <= bounds[:, 1])).all(axis=1)]
+    places = places[np.argsort(np.linalg.norm(places - home[:3, 3], axis=1), kind="stable")]
+    rotations = [
+        home[:3, :3],
+        *(_turned(axis, sign * _TURN) @ home[:3, :3] for axis in range(3) for sign in (1, -1)),
+    ]
+    poses = np.tile(np.eye(4), (len(places), len(rotations), 1, 1))
+    poses[..., :3, :3] = rotations
+    poses[..., :3, 3] = places[:, None]
+    fitted = _core.fit_poses(mech._core, np.ascontiguousarray(poses).reshape(-1))
+    fitted = fitted[np.isfinite(fitted[:, 0, 0])]
+    if not len(fitted):
+        raise WorkspaceError(
+            f"start: no pose of {mech.name} inside all limits was found in the bounds; give one, or other "
+            "bounds"
+        )
+    home_serves = bool(mech.limits(home).within) and np.array_equal(places[0], home[:3, 3])
+    if home_serves and not (regular and mech.conditioning(home).sigma_min < NEAR_SINGULAR):
+        return home
+    room = (
+        mech.conditioning(fitted).sigma_min
+        if regular
+        else mech.limits(fitted).relative.min(axis=1, initial=1.0)
+    )
+    return np.asarray(fitted[int(np.argmax(np.nan_to_num(room, nan=-np.inf)))])
+
+
+def _turned(axis: int, angle: float) -> Array:
+    """The turn by an angle about a base axis."""
+    from scipy.spatial.transform import Rotation
+
+    return np.asarray(Rotation.from_euler("xyz"[axis], angle).as_matrix())
