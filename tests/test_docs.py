@@ -2,7 +2,8 @@
 
 Rules for the texts. A Python block runs in the order of its page, with the names of the blocks before it, in
 an empty folder; with `>>>` its output must be as shown. A TOML or CSV block with `title="name"` is a file
-there. Blocks whose first line is `# motion for NAME` must load for that mechanism; TOML blocks with a name
+there. Blocks whose first line is `# motion for NAME` must load for that mechanism; the rows of those with
+`# leg lengths for NAME` must have poses; TOML blocks with a name
 and legs must load as mechanisms; other TOML blocks must have no fault but missing parts.
 """
 
@@ -24,6 +25,7 @@ from pathlib import Path
 import pytest
 
 import polypod as pp
+from polypod.lengths import load_lengths
 from polypod.schema import read_spec
 from polypod.solution import VARIABLES
 
@@ -160,6 +162,12 @@ def test_file_blocks_are_sound(page: Path, empty_folder: Path) -> None:
             path.write_text(block.text, encoding="utf-8")
             solution = pp.solve(mech, pp.load_motion(path, mech))
             assert (solution.dataset.status == pp.Status.OK).all(), where
+            continue
+        if lengths_of := re.match(r"# leg lengths for (\S+)\n", block.text):
+            mech = pp.load(lengths_of[1])
+            path = empty_folder / f"block.{block.language}"
+            path.write_text(block.text, encoding="utf-8")
+            assert (mech.assembly_modes(load_lengths(path, mech)).number > 0).all(), where
             continue
         assert block.language == "toml", f"{where}: says of no mechanism that it is a motion for it"
         content = tomllib.loads(block.text)
