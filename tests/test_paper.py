@@ -187,3 +187,13 @@ def test_no_mode_of_row_1_has_the_printed_right_angle(first, fit):
 def natural_start(fit):
     coordinates = fit.mechanism.coordinates(fit.orientations.pose[0], "natural")
     return np.array([float(coordinates[name]) for name in ("alpha", "p", "h", "beta", "gamma")])
+
+
+def test_fitted_mechanism_keeps_its_home_upright(mech, fit):
+    """The plane of legs 1 and 3 is upright at home and the rod passes through their base joints."""
+    home = fit.mechanism.coordinates(fit.mechanism.home, "natural")
+    assert abs(home["alpha"]) < 1e-12
+    assert abs(home["p"]) < 1e-12
+    assert fit.mechanism.home[2, 3] == mech.home[2, 3]
+    rod, leg = fit.mechanism.to_dict()["rods"][0], 1e3 * fit.radii[1]
+    assert rod["point"][1] == pytest.approx(leg * np.sin(CORNERS[0]), rel=1e-12)

@@ -158,10 +158,10 @@ def _table_i(mech: Mechanism) -> str:
     fitted = fit.orientations
     e, on_rod, other = 1e3 * fit.radii
     rms, largest = np.degrees([first.rms, fitted.rms]), np.degrees([first.largest, fitted.largest])
-    count, skew = first.modes.number, 1e3 * abs(first.lengths[0, 0] - first.lengths[0, 2])
+    skew = 1e3 * abs(first.lengths[0, 0] - first.lengths[0, 2])
     return f"""## Table I
 
-Of {count.min()} to {count.max()} assembly modes in each row, the one above the base nearest to the print.
+Of up to {first.modes.number.max()} assembly modes in each row, the one above the base nearest to the print.
 
 {fit_markdown(first, fit)}
 

@@ -117,9 +117,9 @@ def fit_table_i(mech: Mechanism) -> Fit:
     """The radii e, E_1 and E_2 with the least sum of squares of the 18 differences to Table I.
 
     The search begins with the radii of `mech` and ends at the least sum near them. The modes are those of
-    `table_i(mech)`, followed from pose to pose [T27]. With the radii, rod and home
-    move so that the rod passes through its base joints and the platform is level at home: their y is
-    E_1 sin θ and (E_1 - e) sin θ, θ the angle of the first leg on the rod.
+    `table_i(mech)`, followed from pose to pose [T27]. With the radii, rod and home move so that the
+    rod passes through its base joints and the plane of r_1 and r_3 is upright at home: their y is E_1 sin θ
+    and (E_1 - e) sin θ, θ the angle of the first leg on the rod.
 
     Raises:
         UnsupportedError: the joints' centres are not given by radius and angle with three radii in all, as in
