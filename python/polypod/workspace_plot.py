@@ -165,7 +165,7 @@ def _draw_triad(ax: Axes, points: Array, right: Array, up: Array, names: list[st
     """The axes' directions in the lower left corner of the picture."""
     flat = points @ np.stack([right, up], axis=1)
     size = 0.16 * float(np.ptp(flat, axis=0).max())
-    corner = flat.min(axis=0) + np.array([0.3 * size, -0.35 * size])
+    corner = flat.min(axis=0) + np.array([0.3 * size, -0.75 * size])
     for axis, name in zip(np.eye(3), names, strict=True):
         tip = corner + size * np.array([axis @ right, axis @ up])
         ax.annotate(
