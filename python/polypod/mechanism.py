@@ -529,13 +529,16 @@ class Mechanism:
 
         Args:
             lengths: (..., n), m; those of passive legs are not read.
-            guess: pose or poses (..., 4, 4) in the mode that is meant; home by default.
+            guess: pose or poses (..., 4, 4) in the mode that is meant; home by default. From a home that is
+                nearly singular, as the published one is, few lengths are reached: take a pose of
+                `assembly_modes` then.
             continued: start each state from the one before, in the order of the flattened batch, as along a
                 motion; the guess then serves the first.
 
-        The status is MODE_JUMP where the guess's mode ends on the way to these lengths; the pose is then of
-        another mode. It is NOT_CONVERGED where no pose was found, and SINGULAR where two modes meet and the
-        pose is known to about 1e-7 only. Lengths that are negative or not finite give INVALID_INPUT.
+        The status is MODE_JUMP where the guess's mode ends on the way to these lengths, or a continued motion
+        passes a singularity, so that the pose is one of another mode; NOT_CONVERGED where no pose was found;
+        SINGULAR where two modes meet, so that the pose is known to about 1e-7 only. Lengths that are negative
+        or not finite give INVALID_INPUT.
 
         >>> import polypod as pp
         >>> mech = pp.load("lu-3spu-2rpu-r")
@@ -558,7 +561,7 @@ class Mechanism:
         Args:
             lengths: (..., n), m; those of passive legs are not read.
 
-        The first call takes about a second: it finds all complex solutions for generic lengths.
+        The first call for a mechanism finds all complex solutions for generic lengths: about a second.
 
         Raises:
             UnsupportedError: not as many actuated legs as freedoms, or singular by design.

@@ -64,17 +64,21 @@ const EXACT: f64 = 1e-12;
 /// mechanisms belong to solutions that run far away as the lengths change: from nearby they stay within reach.
 const GENERIC: f64 = 0.1;
 
-/// The same for the loops of lengths that permute the solutions, in turn.
-const LOOPS: [f64; 3] = [0.1, 0.5, 2.0];
+/// The same for the loops of lengths that permute the solutions, in turn. Small loops go around few of the lengths where
+/// solutions meet and leave most solutions where they are; such a loop confirms nothing.
+const LOOPS: [f64; 2] = [30.0, 100.0];
 
 /// Random poses to begin with.
 const SEEDS: usize = 40;
 
 /// Loops in a row that must find nothing new before the solutions count as complete.
-const CONFIRMATIONS: usize = 15;
+const CONFIRMATIONS: usize = 16;
 
 /// Loops after which the search for all solutions is given up.
 const MOST_LOOPS: usize = 150;
+
+/// Solutions beyond which they cannot be those of six equations of this kind, and the search is given up.
+const MOST_SOLUTIONS: usize = 1000;
 
 /// All solutions for generic complex lengths: where every search starts.
 #[derive(Clone, Debug)]
@@ -229,6 +233,9 @@ pub fn start(mech: &Mechanism) -> Option<Start> {
             }
             result.extend(mech, end);
         }
+        if result.poses.len() > MOST_SOLUTIONS {
+            return None;
+        }
         unchanged = if result.poses.len() == known { unchanged + 1 } else { 0 };
         if unchanged == CONFIRMATIONS {
             return (!result.poses.is_empty()).then_some(result);
@@ -282,11 +289,14 @@ fn modulus(v: Vec3<C>) -> f64 {
     (v.x.norm_sqr() + v.y.norm_sqr() + v.z.norm_sqr()).sqrt()
 }
 
-/// Distance of two poses as a pure number: of the columns of R, and of the points o in characteristic lengths,
-/// relative to how far off o is.
+/// Distance of two poses as a pure number: of the columns of R, and of the points o in characteristic lengths, relative
+/// to how far off o is. Complex rotations may be large; `RᵀR = 1` then holds and tells them apart only to the square of
+/// their size, by which the distance is divided.
 fn distance(mech: &Mechanism, a: &Pose<C>, b: &Pose<C>) -> f64 {
+    let size = a.rotation.0.into_iter().map(modulus).fold(1.0, f64::max);
     let turned = a.rotation.0.iter().zip(b.rotation.0).map(|(&p, q)| modulus(p - q)).fold(0.0, f64::max);
-    turned.max(modulus(a.o - b.o) / (mech.characteristic_length + modulus(a.o)))
+    let moved = modulus(a.o - b.o) / (mech.characteristic_length + modulus(a.o));
+    (turned / (size * size)).max(moved / size)
 }
 
 /// How a path ends.
@@ -366,7 +376,8 @@ impl Path<'_> {
             let (error, rest) = self.correct(&mut next, &end, 2);
             let good = error <= self.precision && rest <= 0.1 * self.precision * self.precision.max(error);
             if good {
-                (pose, t) = (next, t + h);
+                // Large complex rotations would soon leave `RᵀR = 1`.
+                (pose, t) = (Pose { rotation: next.rotation.orthonormalised(), ..next }, t + h);
             }
             // The error grows with the fifth power of the step.
             let factor = 0.8 * (self.precision / error).powf(0.2);

@@ -238,6 +238,18 @@ impl<T: Real> Mat3<T> {
             e + (across + half.cross(across)) * share
         }))
     }
+
+    /// The matrix with the rounding of many products taken off: one Newton step of `MᵀM = 1` \[T29\].
+    #[must_use]
+    #[inline(always)]
+    pub fn orthonormalised(self) -> Self {
+        let half = T::lit(0.5);
+        let products = self.transpose() * self;
+        let identity = Mat3::identity();
+        let excess = Mat3([0, 1, 2].map(|j| (products.0[j] - identity.0[j]) * half));
+        let correction = self * excess;
+        Mat3([0, 1, 2].map(|j| self.0[j] - correction.0[j]))
+    }
 }
 
 impl Mat3<f64> {
