@@ -10,26 +10,9 @@ import numpy as np
 import pytest
 
 import polypod as pp
-from polypod import cli
 
 NAME = "lu-3spu-2rpu-r"
 DATA = Path(__file__).parent / "data"
-
-
-@pytest.fixture
-def run(monkeypatch, capsys):
-    """Runs the command line in this process: exit status, standard output and error without colours."""
-    monkeypatch.setenv("COLUMNS", "100")
-    monkeypatch.delenv("FORCE_COLOR", raising=False)
-
-    def run(*args):
-        monkeypatch.setattr("sys.argv", ["polypod", *map(str, args)])
-        with pytest.raises(SystemExit) as exit:
-            cli.main()
-        out, err = (re.sub(r"\x1b\[[0-9;]*m", "", text) for text in capsys.readouterr())
-        return exit.value.code or 0, out, err
-
-    return run
 
 
 def motion_file(path: Path, **columns: list[float]) -> Path:

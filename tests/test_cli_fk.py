@@ -5,14 +5,12 @@ from __future__ import annotations
 import copy
 import csv
 import json
-import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import polypod as pp
-from polypod import cli
 from polypod.lengths import load_lengths
 
 NAME = "lu-3spu-2rpu-r"
@@ -20,22 +18,7 @@ DATA = Path(__file__).parent / "data"
 PER_METRE = {"m": 1.0, "mm": 1e3, "cm": 1e2, "um": 1e6, "in": 1 / 0.0254}
 STEWART = DATA / "stewart-gough.toml"
 NOWHERE = [0.1, 0.9, 0.1, 0.9, 0.1]  # no pose has these lengths
-
-
-@pytest.fixture
-def run(monkeypatch, capsys):
-    """Runs the command line in this process: exit status, standard output and error without colours."""
-    monkeypatch.setenv("COLUMNS", "140")
-    monkeypatch.delenv("FORCE_COLOR", raising=False)
-
-    def run(*args):
-        monkeypatch.setattr("sys.argv", ["polypod", *map(str, args)])
-        with pytest.raises(SystemExit) as exit:
-            cli.main()
-        out, err = (re.sub(r"\x1b\[[0-9;]*m", "", text) for text in capsys.readouterr())
-        return exit.value.code or 0, out, err
-
-    return run
+COLUMNS = 140
 
 
 @pytest.fixture(scope="module")

@@ -19,7 +19,7 @@ from scipy.optimize import minimize_scalar, nnls
 from scipy.spatial.transform import Rotation
 
 import polypod as pp
-from polypod import Status, cli
+from polypod import Status
 from polypod.summary import summarise
 
 sys.path.insert(0, str(Path(__file__).parent))
@@ -732,39 +732,34 @@ def test_warnings_name_the_limits_passed_at_home():
     assert not [note for note in pp.load("lu-3spu-2rpu-r").warnings if "limit" in note]
 
 
+COLUMNS = 120
+
+
 @pytest.fixture
-def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Callable[..., str]:
-    """Runs the command line in this process: its standard output, words apart by one space."""
-    monkeypatch.setenv("COLUMNS", "120")
-
-    def run(*args: object) -> str:
-        monkeypatch.setattr("sys.argv", ["polypod", *map(str, args)])
-        with pytest.raises(SystemExit):
-            cli.main()
-        return " ".join(capsys.readouterr().out.replace("│", " ").split())
-
-    return run
+def words(run: Callable[..., tuple[int, str, str]]) -> Callable[..., str]:
+    """Runs the command line: its standard output, words apart by one space."""
+    return lambda *args: " ".join(run(*args)[1].replace("│", " ").split())
 
 
-def test_info_lists_limits_and_what_binds(run: Callable[..., str], tmp_path: Path):
+def test_info_lists_limits_and_what_binds(words: Callable[..., str], tmp_path: Path):
     content = paper()
     content["rods"][0]["range"] = {"min": -20.0, "max": 30.0}
     pp.Mechanism.from_dict(content).save(tmp_path / "m.toml")
-    text = run("info", tmp_path / "m.toml")
+    text = words("info", tmp_path / "m.toml")
     assert "stroke max of leg 5 at most 850.0 mm 95.6 mm 0.478 stroke" not in text  # binds no more
     assert "angle of rod L -20.0 deg to 30.0 deg 20.0 deg 0.4 binds" in text
-    facts = json.loads(run("info", tmp_path / "m.toml", "--json"), parse_constant=pytest.fail)
+    facts = json.loads(words("info", tmp_path / "m.toml", "--json"), parse_constant=pytest.fail)
     assert [row["name"] for row in facts["limits"] if row["binds"]] == ["angle of rod L"]
     assert facts["limits"][0]["allowed"] == [0.65, None]
 
 
 def test_solve_tells_the_least_slack_and_limits_passed(
-    run: Callable[..., str], limited: tuple[pp.Mechanism, pp.Motion], tmp_path: Path
+    words: Callable[..., str], limited: tuple[pp.Mechanism, pp.Motion], tmp_path: Path
 ):
     mech, motion = limited
     mech.save(tmp_path / "m.toml")
     facts = summarise(mech, pp.solve(mech, motion))["limits"]
-    text = run("solve", tmp_path / "m.toml", "lu-3spu-2rpu-r", "-o", tmp_path / "r.nc")
+    text = words("solve", tmp_path / "m.toml", "lu-3spu-2rpu-r", "-o", tmp_path / "r.nc")
     assert f"least slack: limit {facts['least']['limit']}" in text
     assert f"... time / s {facts['least']['time']:g}" in text
     row = facts["passed"][1]
@@ -774,6 +769,6 @@ def test_solve_tells_the_least_slack_and_limits_passed(
     assert passed in text
     mech = pp.Mechanism.from_dict(free())
     mech.save(tmp_path / "m.toml")
-    assert "sets no limits" in run("solve", tmp_path / "m.toml", "lu-3spu-2rpu-r", "-o", tmp_path / "r.nc")
-    text = run("solve", "lu-3spu-2rpu-r", "lu-3spu-2rpu-r", "-o", tmp_path / "r.nc")
+    assert "sets no limits" in words("solve", tmp_path / "m.toml", "lu-3spu-2rpu-r", "-o", tmp_path / "r.nc")
+    text = words("solve", "lu-3spu-2rpu-r", "lu-3spu-2rpu-r", "-o", tmp_path / "r.nc")
     assert "All states have an answer, within all limits." in text

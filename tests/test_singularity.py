@@ -480,26 +480,16 @@ def test_findings_survive_files(tmp_path):
         assert pp.load_solution(tmp_path / name).singularities == solution.singularities
 
 
-def test_solve_warns_by_name_and_time(tmp_path, monkeypatch, capsys):
-    from polypod import cli
-
+def test_solve_warns_by_name_and_time(tmp_path, run):
     motion = tmp_path / "turn.csv"
     rows = [[t, 0, 0, 600, 0, 0, np.degrees(1.2 + 0.6 * t)] for t in np.linspace(0, 1, 8)]
     header = "time [s], x [mm], y [mm], z [mm], rx [deg], ry [deg], rz [deg]"
     np.savetxt(motion, rows, fmt="%.17g", delimiter=",", header=header, comments="")
-    monkeypatch.setenv("COLUMNS", "100")
-
-    def run(*more):
-        arguments = ["solve", str(DATA / "stewart-gough.toml"), str(motion), "-o", str(tmp_path / "r.nc")]
-        monkeypatch.setattr("sys.argv", ["polypod", *arguments, *more])
-        with pytest.raises(SystemExit):
-            cli.main()
-        return capsys.readouterr().out
-
-    words = " ".join(run().split())
+    arguments = ["solve", DATA / "stewart-gough.toml", motion, "-o", tmp_path / "r.nc"]
+    words = " ".join(run(*arguments)[1].split())
     assert "Warning: the motion crosses a singular pose at 0.617993878 s; direct singularity" in words
     assert "Warning: the motion is near a singular pose from" in words
-    facts = json.loads(run("--json"))["singularities"]
+    facts = json.loads(run(*arguments, "--json")[1])["singularities"]
     assert facts["crossings"][0]["time"] == pytest.approx((np.pi / 2 - 1.2) / 0.6, abs=1e-9)
     assert facts["near"][0]["kind"] == "ACTUATION"
     assert len(facts["warnings"]) == 2

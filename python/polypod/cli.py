@@ -445,8 +445,7 @@ def fk(
 
 
 def _print_poses(out: Console, facts: dict[str, Any]) -> None:
-    from polypod.motion import KIND_OF_COORDINATE
-    from polypod.units import from_si
+    from polypod.units import KIND_OF_COORDINATE, from_si
 
     rows = [(row, mode) for row in facts["rows"] for mode in row["modes"]]
     if rows:
@@ -626,11 +625,10 @@ def _check_workspace_options(
 
 
 def _print_workspace(out: Console, facts: dict[str, Any]) -> None:
-    from polypod.regions import unit
-    from polypod.units import readable
+    from polypod.units import coordinate_unit, readable
 
     fixed = ", ".join(
-        f"{name} = {readable(value, unit(name))}" for name, value in facts.get("fixed", {}).items()
+        f"{name} = {readable(value, coordinate_unit(name))}" for name, value in facts.get("fixed", {}).items()
     )
     what = (
         "reachable workspace" if facts["kind"] == "reachable" else f"slice at {fixed}" if fixed else "slice"
@@ -643,7 +641,7 @@ def _print_workspace(out: Console, facts: dict[str, Any]) -> None:
     table = _table("Extents", "", "least>", "greatest>", "width>", "step>")
     for name, (low, high) in facts["extents"].items():
         values = (low, high, high - low, facts["step"][name])
-        table.add_row(name, *(readable(value, unit(name)) for value in values))
+        table.add_row(name, *(readable(value, coordinate_unit(name)) for value in values))
     out.print(table)
     word = "volume" if len(facts["extents"]) == 3 else "area"
     out.print(

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from polypod import _core
 from polypod.errors import UnsupportedError, WorkspaceError
 from polypod.mechanism import Mechanism
-from polypod.regions import checked_start, find_start, position_bounds
+from polypod.regions import check_threads, position_bounds, start_of
 from polypod.workspace import with_floor
 
 Array = NDArray[np.float64]
@@ -82,8 +82,7 @@ def length_lattice(
 ) -> LengthLattice:
     """The positions of o over a lattice of leg lengths; see `Mechanism.length_lattice`."""
     mech = with_floor(mech, sigma_min)
-    if threads < 0:
-        raise WorkspaceError(f"threads is {threads!r}; must be 0 (all cores) or more")
+    check_threads(threads)
     strokes = mech.stroke[mech.actuated]
     widths = np.ptp(strokes, axis=1)
     for name, (least, greatest) in zip(np.array(mech.leg_names)[mech.actuated], strokes, strict=True):
@@ -101,10 +100,7 @@ def length_lattice(
     nodes = float(np.prod(np.rint(widths / step) + 1.0))
     if nodes > MOST_NODES:
         raise WorkspaceError(f"step makes a lattice of {nodes:.3g} nodes; at most {MOST_NODES:.0e}: widen it")
-    if start is None:
-        pose = find_start(mech, position_bounds(mech), regular=True)
-    else:
-        pose = checked_start(mech, start)
+    pose = start_of(mech, start, position_bounds(mech), regular=True)
     lattice = _core.Lattice.begin(mech._core, np.ascontiguousarray(pose).reshape(-1), step, layer, threads)
     if lattice is None:
         raise WorkspaceError(

@@ -21,9 +21,8 @@ from numpy.typing import ArrayLike, NDArray
 from polypod.columns import columns_to_si, read_header, read_numbers, read_rows
 from polypod.errors import Fault, LengthsError
 from polypod.mechanism import Mechanism
-from polypod.motion import KIND_OF_COORDINATE
 from polypod.status import Status
-from polypod.units import si_unit
+from polypod.units import KIND_OF_COORDINATE, si_unit
 
 Array = NDArray[np.float64]
 

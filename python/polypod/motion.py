@@ -45,16 +45,11 @@ from scipy.interpolate import BPoly, make_interp_spline
 from polypod.columns import Column, columns_to_si, read_header, read_numbers, read_rows
 from polypod.errors import Fault, MotionError, ShapeError, UnknownNameError, alternatives, shown
 from polypod.schema import Number, Table, Vector, read_table
-from polypod.units import MOTION_KINDS, read_units
+from polypod.units import KIND_OF_COORDINATE, MOTION_KINDS, read_units
 
 Array = NDArray[np.float64]
 Axes = Literal["base", "platform"]
 
-KIND_OF_COORDINATE: dict[str, str | None] = {
-    **dict.fromkeys(("x", "y", "z", "p", "h", "tip_x", "tip_y", "tip_z"), "length"),
-    **dict.fromkeys(("alpha", "beta", "gamma", "rx", "ry", "rz", "turn"), "angle"),
-    **dict.fromkeys(("axis_x", "axis_y", "axis_z")),  # a direction of any length, without unit
-}
 KIND_OF_WRENCH: dict[str, str | None] = {
     **dict.fromkeys(("force_x", "force_y", "force_z"), "force"),
     **dict.fromkeys(("torque_x", "torque_y", "torque_z"), "torque"),

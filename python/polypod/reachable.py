@@ -11,7 +11,7 @@ from polypod import _core
 from polypod.boundary import Cuts
 from polypod.errors import WorkspaceError
 from polypod.mechanism import Mechanism
-from polypod.regions import bounds_of, checked_start, find_start, grid_of
+from polypod.regions import bounds_of, check_threads, grid_of, start_of
 from polypod.workspace import EDGE_OF_GRID, NO_POSE, SINGULARITY, Workspace, enclosed, label_names, with_floor
 
 CELLS = 64
@@ -33,11 +33,10 @@ def reachable(
 ) -> Workspace:
     """The positions of o that can be reached from a start pose; see `Mechanism.workspace`."""
     mech = with_floor(mech, sigma_min)
-    if threads < 0:
-        raise WorkspaceError(f"threads is {threads!r}; must be 0 (all cores) or more")
+    check_threads(threads)
     grid = grid_of(bounds_of(mech, ("x", "y", "z"), bounds), _one(step), CELLS, cubic=True)
     box = grid.bounds()
-    pose = find_start(mech, box, regular=keep_aspect) if start is None else checked_start(mech, start)
+    pose = start_of(mech, start, box, regular=keep_aspect)
     if not ((pose[:3, 3] >= box[:, 0]) & (pose[:3, 3] <= box[:, 1])).all():
         raise WorkspaceError(f"start: o is at {_place(pose[:3, 3])}, outside the bounds")
     flood = _core.Flood.begin(

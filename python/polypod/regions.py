@@ -13,6 +13,7 @@ from polypod.errors import CoordinateError, WorkspaceError, alternatives
 from polypod.mechanism import Mechanism
 from polypod.singularity import NEAR_SINGULAR
 from polypod.status import Status
+from polypod.units import coordinate_unit
 
 Array = NDArray[np.float64]
 
@@ -29,8 +30,6 @@ _TURN = 0.3
 """Turn from home, rad, of the other rotations with which it is looked for."""
 
 _POSITIONS = ("x", "y", "z", "tip_x", "tip_y", "tip_z")
-_LENGTHS = ("p", "h")
-_DIRECTIONS = ("axis_x", "axis_y", "axis_z")
 
 
 class Grid(NamedTuple):
@@ -58,12 +57,6 @@ class Grid(NamedTuple):
         """(d, 2): ends of the box."""
         low = self.origin - 0.5 * self.steps
         return np.stack([low, low + self.steps * np.array(self.counts)], axis=1)
-
-
-def unit(name: str) -> str:
-    """The unit of a coordinate."""
-    lengths = name in _POSITIONS or name in _LENGTHS
-    return "m" if lengths else "1" if name in _DIRECTIONS else "rad"
 
 
 def position_bounds(mech: Mechanism) -> Array:
@@ -107,9 +100,9 @@ def bounds_of(
             low, high = box[_POSITIONS.index(name) % 3]
             more = tip if name.startswith("tip") else 0.0
             ends = (low - more, high + more)
-        elif name in _LENGTHS:
+        elif coordinate_unit(name) == "m":
             ends = (-reach, reach)
-        elif unit(name) == "1":
+        elif coordinate_unit(name) == "1":
             ends = (-1.0, 1.0)
         else:
             ends = (0.0 if name == "tilt" else -np.pi, np.pi)
@@ -150,10 +143,10 @@ def grid_of(
             these are symmetric about zero; else cells fit the bounds.
     """
     names = tuple(bounds)
-    if not isinstance(step, Mapping) and step is not None and len({unit(n) for n in names}) > 1:
+    if not isinstance(step, Mapping) and step is not None and len({coordinate_unit(n) for n in names}) > 1:
         raise WorkspaceError(
             f"step is {step!r} for coordinates in different units; needs one for each: "
-            f"{', '.join(f'{n} in {unit(n)}' for n in names)}"
+            f"{', '.join(f'{n} in {coordinate_unit(n)}' for n in names)}"
         )
     chosen = dict(step) if isinstance(step, Mapping) else dict.fromkeys(names, step)
     for name in chosen:
@@ -165,7 +158,7 @@ def grid_of(
         if width is None:
             width = (max(b - a for a, b in bounds.values()) if cubic else high - low) / cells
         if not (np.isfinite(width) and width > 0.0):
-            raise WorkspaceError(f"step of {name} is {width!r}; must be above 0 {unit(name)}")
+            raise WorkspaceError(f"step of {name} is {width!r}; must be above 0 {coordinate_unit(name)}")
         if cubic:
             count = max(int(np.ceil((high - low) / width - 1e-9)), 1)
             low = -0.5 * count * width if abs(low + high) < 1e-9 else low
@@ -198,6 +191,17 @@ def checked_start(mech: Mechanism, start: ArrayLike) -> Array:
         )
         raise WorkspaceError(f"start {why}; needs a pose inside all limits")
     return pose
+
+
+def start_of(mech: Mechanism, start: ArrayLike | None, bounds: Array, *, regular: bool) -> Array:
+    """(4, 4): the pose given to start from, checked, or one that is found in the bounds (3, 2)."""
+    return find_start(mech, bounds, regular=regular) if start is None else checked_start(mech, start)
+
+
+def check_threads(threads: int) -> None:
+    """Raises WorkspaceError for a number of threads that is none."""
+    if threads < 0:
+        raise WorkspaceError(f"threads is {threads!r}; must be 0 (all cores) or more")
 
 
 def find_start(mech: Mechanism, bounds: Array, *, regular: bool) -> Array:

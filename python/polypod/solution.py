@@ -19,6 +19,7 @@ from polypod.passages import find_passages
 from polypod.results import Solution
 from polypod.singularity import Determinant
 from polypod.status import Status
+from polypod.units import coordinate_unit
 
 CHUNK = 20_000
 """States solved between two reports of progress."""
@@ -84,8 +85,6 @@ VARIABLES: dict[str, tuple[tuple[str, ...], str, str, str]] = {
     "determinant": (_TIME, "1", "det J", "determinant of the Jacobian in pure numbers"),
     "determinant_rate": (_TIME, "1/s", "(det J)'", "rate of the determinant"),
 }
-_LENGTHS = {"x", "y", "z", "p", "h", "tip_x", "tip_y", "tip_z"}
-_PURE = {"axis_x", "axis_y", "axis_z"}
 # prefix of the variable, in words, unit, primes
 _ORDERS = (
     ("coordinate_second_rate_", "second rate of ", "/s^2", "''"),
@@ -266,6 +265,5 @@ def _coordinate_attributes(name: str) -> dict[str, str]:
     """Unit and names of a variable such as coordinate_rate_alpha."""
     prefix, before, per, primes = next(order for order in _ORDERS if name.startswith(order[0]))
     base = name.removeprefix(prefix)
-    unit = "m" if base in _LENGTHS else "1" if base in _PURE else "rad"
     symbol = _SYMBOLS.get(base, base) + primes
-    return {"units": unit + per, "symbol": symbol, "long_name": f"{before}coordinate {base}"}
+    return {"units": coordinate_unit(base) + per, "symbol": symbol, "long_name": f"{before}coordinate {base}"}

@@ -30,6 +30,19 @@ MECHANISM_KINDS = ("length", "angle", "mass", "inertia", "force", "torque", "acc
 MOTION_KINDS = ("time", "length", "angle", "force", "torque")
 
 
+KIND_OF_COORDINATE: dict[str, str | None] = {
+    **dict.fromkeys(("x", "y", "z", "p", "h", "tip_x", "tip_y", "tip_z"), "length"),
+    **dict.fromkeys(("alpha", "beta", "gamma", "rx", "ry", "rz", "turn"), "angle"),
+    **dict.fromkeys(("axis_x", "axis_y", "axis_z")),  # a direction of any length, without unit
+}
+
+
+def coordinate_unit(name: str) -> str:
+    """The SI unit of a coordinate, 1 for one without; those of no coordinate set are angles."""
+    kind = KIND_OF_COORDINATE.get(name, "angle")
+    return "1" if kind is None else si_unit(kind)
+
+
 def si_unit(kind: str) -> str:
     """The SI unit of a kind of quantity."""
     return next(iter(UNITS[kind]))

@@ -17,9 +17,10 @@ from polypod import _core
 from polypod.boundary import Cuts, content_with_error, surface
 from polypod.errors import WorkspaceError
 from polypod.mechanism import Mechanism
-from polypod.regions import Grid, unit
+from polypod.regions import Grid
 from polypod.results import _replacing
 from polypod.style import GREY, INK, PALE, YELLOW, color_of
+from polypod.units import coordinate_unit
 
 if TYPE_CHECKING:
     import trimesh
@@ -77,7 +78,7 @@ class Workspace:
     @property
     def units(self) -> tuple[str, ...]:
         """Of the coordinates."""
-        return tuple(unit(name) for name in self.names)
+        return tuple(coordinate_unit(name) for name in self.names)
 
     @property
     def volume_unit(self) -> str:

@@ -76,6 +76,12 @@ pub fn system<T: Real>(mech: &Mechanism, pose: &Pose<T>, squares: &[T; 6]) -> Sy
     System { residual, matrix }
 }
 
+/// The squared lengths of the actuated legs, in the order of the equations.
+#[must_use]
+pub fn squares(lengths: &[f64]) -> [f64; 6] {
+    std::array::from_fn(|i| lengths.get(i).map_or(0.0, |l| l * l))
+}
+
 /// A solution (v/Λ, ω) of the system as a step of the pose.
 #[inline(always)]
 pub fn step_of<T: Real>(mech: &Mechanism, x: [T; 6], share: T) -> Twist<T> {
@@ -131,7 +137,7 @@ pub struct Found {
 /// mode.
 #[must_use]
 pub fn forward_kinematics(mech: &Mechanism, lengths: &[f64], guess: &Pose<f64>) -> Found {
-    let squares: [f64; 6] = std::array::from_fn(|i| lengths.get(i).map_or(0.0, |l| l * l));
+    let squares = squares(lengths);
     if !lengths.iter().all(|l| *l >= 0.0 && l.is_finite()) {
         let nan = f64::NAN;
         return Found { pose: *guess, residual: nan, iterations: 0, sign: nan, status: Status::InvalidInput };
@@ -157,7 +163,7 @@ pub fn passed(
     last: &Pose<f64>,
     found: &Found,
 ) -> Option<Found> {
-    let squares: [f64; 6] = std::array::from_fn(|i| lengths.get(i).map_or(0.0, |l| l * l));
+    let squares = squares(lengths);
     let turn = last.rotation * before.rotation.transpose();
     let ahead = Pose { rotation: turn * last.rotation, o: last.o + last.o - before.o };
     if newton(mech, &ahead, &squares, &[0.0; 6]).sign == found.sign {
@@ -187,8 +193,8 @@ pub fn continuation(
     guess: &Pose<f64>,
     shortest: f64,
 ) -> (Option<Pose<f64>>, u32) {
-    let errors = system(mech, guess, squares).residual;
-    let sign = newton(mech, guess, squares, &[0.0; 6]).sign;
+    let System { residual: errors, matrix } = system(mech, guess, squares);
+    let sign = solve(matrix, errors).sign;
     let (mut pose, mut t, mut piece, mut steps) = (*guess, 0.0, 1.0_f64, 0);
     while t < 1.0 {
         piece = piece.min(1.0 - t);

@@ -3,11 +3,11 @@
 
 use rayon::prelude::*;
 
-use crate::forward::{continuation, forward_kinematics};
+use crate::forward::{continuation, forward_kinematics, squares};
 use crate::leg;
 use crate::limits::{Bound, Measure};
 use crate::mechanism::Mechanism;
-use crate::reach::{ON_LIMIT, nearest_limit};
+use crate::reach::{ON_LIMIT, margins, nearest};
 use crate::spatial::Pose;
 use crate::status::Status;
 
@@ -161,7 +161,7 @@ impl Lattice {
             .par_iter()
             .map(|from| {
                 let lengths = self.lengths(from[0].0 as i64);
-                let squares = std::array::from_fn(|i| lengths.get(i).map_or(0.0, |l| l * l));
+                let squares = squares(&lengths);
                 from.iter().take(TRIES).find_map(|&(node, i)| {
                     let (found, _) = continuation(mech, &squares, &self.front[i].1, SHORTEST_PIECE);
                     found.map(|pose| (node, pose))
@@ -181,7 +181,7 @@ impl Lattice {
         let pose = self.front[i].1;
         let reached = &mut self.reached;
         // The lengths of a node on the stroke's end are there up to rounding.
-        if nearest_limit(mech, &pose).is_some_and(|(_, margin)| !(margin >= -ON_LIMIT)) {
+        if !(nearest(mech, &margins(mech, &pose)) >= -ON_LIMIT) {
             reached.outside += 1;
             return;
         }

@@ -8,6 +8,7 @@ pub mod batch;
 pub mod clearance;
 pub mod constraint;
 pub mod coordinates;
+mod draw;
 pub mod dynamics;
 pub mod forward;
 pub mod jacobian;

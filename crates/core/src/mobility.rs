@@ -5,6 +5,7 @@
 //! mechanism's size, and the largest counts: at a singular pose a rank only drops.
 
 use crate::constraint;
+use crate::draw::Draw;
 use crate::leg;
 use crate::mechanism::{
     Constraint, ConstraintRow, Graph, GraphJoint, GraphLink, Leg, Mechanism, Mobility, Side, Turning,
@@ -78,19 +79,11 @@ fn joint_freedoms(kind: &str) -> usize {
 
 /// Poses near home that satisfy the constraints, the same ones every time.
 fn generic_poses(mech: &Mechanism) -> Vec<Pose<f64>> {
-    let mut seed = 0x2545_F491_4F6C_DD1D_u64;
-    let mut uniform = move || {
-        // xorshift64*: any fixed generic direction will do.
-        seed ^= seed >> 12;
-        seed ^= seed << 25;
-        seed ^= seed >> 27;
-        let bits = u32::try_from(seed.wrapping_mul(0x2545_F491_4F6C_DD1D) >> 32).unwrap_or(0);
-        f64::from(bits) / f64::from(u32::MAX) * 2.0 - 1.0
-    };
+    let mut draw = Draw(0x2545_F491_4F6C_DD1D);
     let size = mech.characteristic_length;
     let mut poses = Vec::new();
     for _ in 0..SAMPLES {
-        let mut vector = || Vec3::new(uniform(), uniform(), uniform());
+        let mut vector = || draw.vector(Draw::number);
         let start = Pose {
             rotation: Mat3::from_rotation_vector(vector() * 0.3) * mech.home.rotation,
             o: mech.home.o + vector() * (0.3 * size),

@@ -6,6 +6,7 @@
 
 use nalgebra::Complex;
 
+use crate::draw::Draw;
 use crate::forward::{self, FOLD_PIVOTS, Found, System, step_of, system};
 use crate::leg;
 use crate::linear::solve;
@@ -175,28 +176,6 @@ fn plane(points: &[Vec3<f64>]) -> Option<(Vec3<f64>, Vec3<f64>)> {
     points.iter().all(|&p| normal.dot(p - first).abs() <= 1e-12 * size).then_some((first, normal))
 }
 
-/// A fixed generator: every search starts from the same generic lengths.
-struct Draw(u64);
-
-impl Draw {
-    /// Uniform in (-1, 1), by xorshift64*.
-    fn number(&mut self) -> f64 {
-        self.0 ^= self.0 >> 12;
-        self.0 ^= self.0 << 25;
-        self.0 ^= self.0 >> 27;
-        let bits = u32::try_from(self.0.wrapping_mul(0x2545_F491_4F6C_DD1D) >> 32).unwrap_or(0);
-        f64::from(bits) / f64::from(u32::MAX) * 2.0 - 1.0
-    }
-
-    fn complex(&mut self) -> C {
-        C::new(self.number(), self.number())
-    }
-
-    fn vector(&mut self) -> Vec3<C> {
-        Vec3::new(self.complex(), self.complex(), self.complex())
-    }
-}
-
 /// All solutions for generic complex lengths, by continuation from random complex poses \[T29\]; none where the legs
 /// and constraints are not six equations.
 #[must_use]
@@ -249,8 +228,8 @@ fn random_pose(mech: &Mechanism, draw: &mut Draw) -> Option<Pose<C>> {
     let length = mech.legs.iter().map(|leg| leg::position(leg, &mech.home).length).fold(0.0, f64::max);
     let home = Pose::lift(&mech.home);
     let mut pose = Pose {
-        rotation: Mat3::cayley(draw.vector() * C::lit(1.5)) * home.rotation,
-        o: home.o + draw.vector() * C::lit(length),
+        rotation: Mat3::cayley(draw.vector(Draw::complex) * C::lit(1.5)) * home.rotation,
+        o: home.o + draw.vector(Draw::complex) * C::lit(length),
     };
     let free: [[C; 6]; 6] = std::array::from_fn(|_| std::array::from_fn(|_| draw.complex()));
     let dof = mech.dof();
@@ -427,7 +406,7 @@ pub fn assembly_modes(mech: &Mechanism, start: &Start, lengths: &[f64]) -> Modes
     if !lengths.iter().all(|l| *l >= 0.0 && l.is_finite()) {
         return Modes { modes: vec![], status: Status::InvalidInput };
     }
-    let squares: [f64; 6] = std::array::from_fn(|i| lengths.get(i).map_or(0.0, |l| l * l));
+    let squares = forward::squares(lengths);
     let to = squares.map(C::lit);
     let mut ends = Vec::new();
     let mut complete = false;
@@ -439,17 +418,17 @@ pub fn assembly_modes(mech: &Mechanism, start: &Start, lengths: &[f64]) -> Modes
             break;
         }
     }
+    let up = upward(mech);
     let mut modes: Vec<Mode> = Vec::new();
     for end in ends {
         let (End::Regular(pose) | End::Singular(pose)) = end else { continue };
         let mirrored = start.mirror.map(|m| m.apply(&pose));
         for pose in std::iter::once(pose).chain(mirrored) {
-            if let Some(mode) = real_mode(mech, &squares, &pose) {
+            if let Some(mode) = real_mode(mech, &squares, &pose, up) {
                 keep(mech, &mut modes, mode);
             }
         }
     }
-    let up = upward(mech);
     let height = |m: &Mode| up.dot(m.pose.o);
     modes.sort_by(|a, b| height(b).total_cmp(&height(a)));
     let status = match (complete, modes.iter().any(|m| m.singular)) {
@@ -473,7 +452,7 @@ fn all_kept(mech: &Mechanism, ends: &[End]) -> bool {
 }
 
 /// The real pose that a complex solution is, if it is one.
-fn real_mode(mech: &Mechanism, squares: &[f64; 6], pose: &Pose<C>) -> Option<Mode> {
+fn real_mode(mech: &Mechanism, squares: &[f64; 6], pose: &Pose<C>, up: Vec3<f64>) -> Option<Mode> {
     let o = pose.o * C::lit(1.0 / mech.characteristic_length);
     let parts = pose.rotation.0.iter().flat_map(|c| c.array()).chain(o.array());
     let imaginary = parts.map(|e| e.im.abs()).fold(0.0, f64::max);
@@ -492,7 +471,7 @@ fn real_mode(mech: &Mechanism, squares: &[f64; 6], pose: &Pose<C>) -> Option<Mod
     if !(real && residual <= EXACT * longest && moved <= 10.0 * imaginary + MEETING) {
         return None;
     }
-    let above = upward(mech).dot(found.o - mech.legs[0].base.point) > 0.0;
+    let above = up.dot(found.o - mech.legs[0].base.point) > 0.0;
     let singular = status == Status::Singular;
     Some(Mode { pose: found, sign, above, multiplicity: 1, singular, residual })
 }

@@ -5,8 +5,7 @@ use crate::dynamics;
 use crate::limits::{Limit, Measure};
 use crate::linear::solve;
 use crate::mechanism::Mechanism;
-use crate::real::Dual;
-use crate::spatial::{Acceleration, Mat3, Motion, Pose, Twist, Vec3};
+use crate::spatial::{Acceleration, Motion, Pose, Twist, Vec3};
 
 /// Steps after which the search is given up.
 const STEPS: usize = 40;
@@ -87,13 +86,7 @@ pub fn fit(mech: &Mechanism, pose: &Pose<f64>, o: Vec3<f64>) -> Option<Pose<f64>
 /// The derivative of a limit's margin by a turn of the platform about o, by duals.
 fn gradient(mech: &Mechanism, limit: &Limit, pose: &Pose<f64>) -> Vec3<f64> {
     let along = |axis: Vec3<f64>| {
-        let dual = |x: Vec3<f64>, d: Vec3<f64>| {
-            Vec3::new(Dual::new(x.x, d.x), Dual::new(x.y, d.y), Dual::new(x.z, d.z))
-        };
-        let turning = Pose {
-            rotation: Mat3(pose.rotation.0.map(|c| dual(c, axis.cross(c)))),
-            o: Vec3::<Dual<f64>>::lift(pose.o),
-        };
+        let turning = pose.along(&Twist::new(Vec3::zero(), axis));
         limit.geometric(mech, &turning).map_or(0.0, |value| limit.bound.margin(value).d)
     };
     Vec3::new(along(Vec3::X), along(Vec3::Y), along(Vec3::Z))
@@ -116,27 +109,17 @@ fn forces_at_rest(mech: &Mechanism, pose: &Pose<f64>) -> [f64; 6] {
 }
 
 /// The margins of all limits at a pose, each in its own unit.
-fn margins<'a>(mech: &'a Mechanism, pose: &'a Pose<f64>) -> impl Iterator<Item = (&'a Limit, f64)> {
-    let forces = mech
-        .limits
-        .iter()
-        .any(|l| matches!(l.measure, Measure::Force { .. }))
-        .then(|| forces_at_rest(mech, pose));
-    mech.limits.iter().map(move |l| (l, l.margin(mech, pose, forces.as_ref())))
+#[must_use]
+pub fn margins(mech: &Mechanism, pose: &Pose<f64>) -> Vec<f64> {
+    let needs_forces = mech.limits.iter().any(|l| matches!(l.measure, Measure::Force { .. }));
+    let forces = needs_forces.then(|| forces_at_rest(mech, pose));
+    mech.limits.iter().map(|l| l.margin(mech, pose, forces.as_ref())).collect()
 }
 
-/// The limit that is nearest at a pose, relative to its scale, and its margin in its own unit.
+/// The margin of the limit that is nearest relative to its scale; NaN without limits.
 #[must_use]
-pub fn nearest_limit(mech: &Mechanism, pose: &Pose<f64>) -> Option<(usize, f64)> {
-    let relative = |(limit, margin): (&Limit, f64)| margin / limit.scale;
-    margins(mech, pose)
-        .enumerate()
-        .min_by(|(_, a), (_, b)| relative(*a).total_cmp(&relative(*b)))
-        .map(|(i, (_, margin))| (i, margin))
-}
-
-/// The first limit whose margin is at most `near`, in its own unit.
-#[must_use]
-pub fn first_limit(mech: &Mechanism, pose: &Pose<f64>, near: f64) -> Option<usize> {
-    margins(mech, pose).position(|(_, margin)| margin <= near)
+pub fn nearest(mech: &Mechanism, margins: &[f64]) -> f64 {
+    let relative = |(margin, limit): &(&f64, &Limit)| **margin / limit.scale;
+    let least = margins.iter().zip(&mech.limits).min_by(|a, b| relative(a).total_cmp(&relative(b)));
+    least.map_or(f64::NAN, |(margin, _)| *margin)
 }

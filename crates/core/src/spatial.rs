@@ -86,6 +86,12 @@ impl<T: Real> Vec3<T> {
 }
 
 impl Vec3<f64> {
+    /// The vector with its rate.
+    #[must_use]
+    pub fn with_rate(self, d: Self) -> Vec3<Dual<f64>> {
+        Vec3::new(Dual::new(self.x, d.x), Dual::new(self.y, d.y), Dual::new(self.z, d.z))
+    }
+
     pub const X: Self = Vec3 { x: 1.0, y: 0.0, z: 0.0 };
     pub const Y: Self = Vec3 { x: 0.0, y: 1.0, z: 0.0 };
     pub const Z: Self = Vec3 { x: 0.0, y: 0.0, z: 1.0 };
@@ -333,13 +339,19 @@ impl Pose<f64> {
     /// The pose with its rate along a twist.
     #[must_use]
     pub fn along(&self, twist: &Twist<f64>) -> Pose<Dual<f64>> {
-        let dual = |x: Vec3<f64>, d: Vec3<f64>| {
-            Vec3::new(Dual::new(x.x, d.x), Dual::new(x.y, d.y), Dual::new(x.z, d.z))
-        };
         Pose {
-            rotation: Mat3(self.rotation.0.map(|c| dual(c, twist.omega.cross(c)))),
-            o: dual(self.o, twist.v),
+            rotation: Mat3(self.rotation.0.map(|c| c.with_rate(twist.omega.cross(c)))),
+            o: self.o.with_rate(twist.v),
         }
+    }
+
+    /// The homogeneous matrix, row by row.
+    #[must_use]
+    pub fn matrix(&self) -> [f64; 16] {
+        let ([x, y, z], o) = (self.rotation.rows(), self.o.array());
+        let row = |r: [f64; 3], o: f64| [r[0], r[1], r[2], o];
+        let rows = [row(x, o[0]), row(y, o[1]), row(z, o[2]), [0.0, 0.0, 0.0, 1.0]];
+        std::array::from_fn(|i| rows[i / 4][i % 4])
     }
 }
 

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use crate::jacobian::scaled_jacobian;
 use crate::linear::solve;
 use crate::mechanism::Mechanism;
-use crate::reach::{first_limit, fit, nearest_limit};
+use crate::reach::{fit, margins, nearest};
 use crate::spatial::{Mat3, Pose, Vec3};
 
 /// A cubic grid; its nodes, the middles of cubic cells, are counted with z fastest.
@@ -127,10 +127,7 @@ impl Flood {
                 (0..6).find_map(from).map(|pose| (node, pose.rotation))
             })
             .collect();
-        for &(node, rotation) in &found {
-            self.mask[node] = true;
-            self.rotations.insert(node, rotation);
-        }
+        self.mark(&found);
         // Inner nodes are of no more use.
         let touched: Vec<usize> =
             self.fresh.iter().chain(found.iter().map(|(node, _)| node)).copied().collect();
@@ -148,26 +145,30 @@ impl Flood {
     /// ones. From them waves may go on.
     pub fn retry(&mut self, mech: &Mechanism) -> usize {
         let open = self.open();
+        // A node that several neighbours reach is reached once, from the last of them.
         let found: BTreeMap<usize, Mat3<f64>> = open
             .par_iter()
             .filter_map(|&(node, d, rotation)| {
                 let (from, to) = (self.grid.place(node), self.grid.neighbour(node, d));
                 let beyond = self.grid.node(to)?;
                 let (from, to) = (self.grid.point(from), self.grid.point(to));
-                let mut pose = Pose { rotation, o: from };
-                for k in 1..=SMALL_PIECES {
-                    let t = f64::from(k) / f64::from(SMALL_PIECES);
-                    pose = moved(mech, &pose, from * (1.0 - t) + to * t, self.sign)?;
-                }
+                let step = |pose: &Pose<f64>, o| moved(mech, pose, o, self.sign);
+                let pose = in_pieces(&Pose { rotation, o: from }, to, SMALL_PIECES, step)?;
                 Some((beyond, pose.rotation))
             })
             .collect();
-        for (&node, &rotation) in &found {
+        let found: Vec<(usize, Mat3<f64>)> = found.into_iter().collect();
+        self.mark(&found);
+        self.fresh = found.into_iter().map(|(node, _)| node).collect();
+        self.fresh.len()
+    }
+
+    /// Takes nodes for reached.
+    fn mark(&mut self, found: &[(usize, Mat3<f64>)]) {
+        for &(node, rotation) in found {
             self.mask[node] = true;
             self.rotations.insert(node, rotation);
         }
-        self.fresh = found.into_keys().collect();
-        self.fresh.len()
     }
 
     /// The edges between reached and unreached nodes, those out of the grid too: reached node, direction, rotation.
@@ -207,7 +208,8 @@ impl Flood {
                 None => high = middle,
             }
         }
-        let binding = first_limit(mech, &pose, AT_LIMIT);
+        let margins = margins(mech, &pose);
+        let binding = margins.iter().position(|&margin| margin <= AT_LIMIT);
         let beyond = || fit(mech, &pose, inner + way * high);
         let stop = match (binding, self.sign) {
             _ if ends && low >= whole - EXACT / self.grid.step => Stop::Grid,
@@ -215,8 +217,7 @@ impl Flood {
             (_, Some(kept)) if beyond().is_none_or(|p| sign(mech, &p) != kept) => Stop::Singularity,
             _ => Stop::Search,
         };
-        let margin = nearest_limit(mech, &pose).map_or(f64::NAN, |(_, margin)| margin);
-        Edge { node, direction, share: low, pose, stop, margin }
+        Edge { node, direction, share: low, pose, stop, margin: nearest(mech, &margins) }
     }
 }
 
@@ -251,17 +252,23 @@ pub enum Stop {
 /// A pose at `o` from one nearby, if there is one, at once or in pieces; with the sign of det J kept at the end of each
 /// piece, if it is given.
 fn moved(mech: &Mechanism, pose: &Pose<f64>, o: Vec3<f64>, kept: Option<f64>) -> Option<Pose<f64>> {
-    let in_pieces = || {
-        let (from, mut pose) = (pose.o, *pose);
-        for k in 1..=PIECES {
-            let t = f64::from(k) / f64::from(PIECES);
-            let place = if k < PIECES { from * (1.0 - t) + o * t } else { o };
-            pose = fit(mech, &pose, place).filter(|p| kept.is_none_or(|kept| sign(mech, p) == kept))?;
-        }
-        Some(pose)
-    };
-    let at_once = if kept.is_none() { fit(mech, pose, o) } else { None };
-    at_once.or_else(in_pieces)
+    let step =
+        |pose: &Pose<f64>, o| fit(mech, pose, o).filter(|p| kept.is_none_or(|kept| sign(mech, p) == kept));
+    let at_once = if kept.is_none() { step(pose, o) } else { None };
+    at_once.or_else(|| in_pieces(pose, o, PIECES, step))
+}
+
+/// The pose at the end of a straight way of o, step by step.
+fn in_pieces(
+    pose: &Pose<f64>,
+    o: Vec3<f64>,
+    pieces: u32,
+    step: impl Fn(&Pose<f64>, Vec3<f64>) -> Option<Pose<f64>>,
+) -> Option<Pose<f64>> {
+    (1..=pieces).try_fold(*pose, |at, k| {
+        let t = f64::from(k) / f64::from(pieces);
+        step(&at, if k < pieces { pose.o * (1.0 - t) + o * t } else { o })
+    })
 }
 
 fn sign(mech: &Mechanism, pose: &Pose<f64>) -> f64 {

@@ -3,7 +3,7 @@
 
 mod common;
 
-use common::{Draw, close, every_leg, moving, on_rod, parts, published, states, with_leg};
+use common::{Draw, close, every_leg, mechanisms, moving, on_rod, parts, published, states, with_leg};
 use polypod_core::constraint;
 use polypod_core::coordinates::Set;
 use polypod_core::dynamics;
@@ -16,15 +16,6 @@ use polypod_core::spatial::{Acceleration, Mat3, Motion, Pose, Twist, Vec3, Wrenc
 
 /// Relative, for second derivatives by two routes in double precision.
 const EXACT: f64 = 1e-10;
-
-fn mechanisms() -> Vec<Mechanism> {
-    every_leg()
-        .iter()
-        .enumerate()
-        .map(|(i, letters)| with_leg(letters, i as u64 + 1))
-        .chain([on_rod(1, 3), on_rod(2, 4), on_rod(3, 5), published()])
-        .collect()
-}
 
 /// States to test at: generic ones, and for the published manipulator its nearly singular neighbourhood of home.
 fn samples(mech: &Mechanism) -> Vec<Motion<f64>> {

@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::{every_leg, on_rod, published, states, with_leg};
+use common::{mechanisms, published, states, with_leg};
 use nalgebra::Matrix6;
 use polypod_core::constraint;
 use polypod_core::jacobian;
@@ -10,15 +10,6 @@ use polypod_core::leg;
 use polypod_core::mechanism::{ConstraintKind, Mechanism};
 use polypod_core::singularity::{self, Kind, TOLERANCE, determinant, singularity};
 use polypod_core::spatial::{Mat3, Motion, Pose, Twist};
-
-fn mechanisms() -> Vec<Mechanism> {
-    every_leg()
-        .iter()
-        .enumerate()
-        .map(|(i, letters)| with_leg(letters, i as u64 + 1))
-        .chain([on_rod(1, 3), on_rod(2, 4), on_rod(3, 5), published()])
-        .collect()
-}
 
 /// The pose after a time on the motion with the constant twist.
 fn after(state: &Motion<f64>, time: f64) -> Pose<f64> {

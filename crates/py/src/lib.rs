@@ -71,6 +71,21 @@ type CoordinateSet = (&'static str, Vec<&'static str>, Option<Vec<bool>>);
 struct PyMechanism(Mechanism, OnceLock<Option<Start>>);
 
 impl PyMechanism {
+    /// An operation on a motion under load.
+    fn loaded<'py>(
+        &self,
+        py: Python<'py>,
+        [poses, twists, accelerations]: [&Array<'py>; 3],
+        wrenches: Option<&Array<'py>>,
+        platform_axes: bool,
+        operation: fn(&Mechanism, &States, &Loads) -> Table,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        let states = states(poses, twists, accelerations)?;
+        let loads = loads(wrenches, platform_axes, states.poses)?;
+        let table = py.detach(|| operation(&self.0, &states, &loads));
+        arrays(py, table)
+    }
+
     fn core(&self) -> &Mechanism {
         &self.0
     }
@@ -123,13 +138,7 @@ impl PyMechanism {
 
     #[getter]
     fn home<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let (r, o) = (self.0.home.rotation.rows(), self.0.home.o.array());
-        let mut m = vec![0.0; 16];
-        for k in 0..3 {
-            m[4 * k..4 * k + 4].copy_from_slice(&[r[k][0], r[k][1], r[k][2], o[k]]);
-        }
-        m[15] = 1.0;
-        Ok(PyArray1::from_vec(py, m).reshape([4, 4])?.into_any())
+        Ok(PyArray1::from_slice(py, &self.0.home.matrix()).reshape([4, 4])?.into_any())
     }
 
     /// Letters of each leg's joints from base to platform.
@@ -294,10 +303,8 @@ impl PyMechanism {
         wrenches: Option<Array<'py>>,
         platform_axes: bool,
     ) -> PyResult<Bound<'py, PyDict>> {
-        let states = states(&poses, &twists, &accelerations)?;
-        let loads = loads(wrenches.as_ref(), platform_axes, states.poses)?;
-        let table = py.detach(|| batch::inverse_dynamics(&self.0, &states, &loads));
-        arrays(py, table)
+        let motion = [&poses, &twists, &accelerations];
+        self.loaded(py, motion, wrenches.as_ref(), platform_axes, batch::inverse_dynamics)
     }
 
     #[pyo3(signature = (poses, twists, accelerations, wrenches, platform_axes))]
@@ -310,10 +317,8 @@ impl PyMechanism {
         wrenches: Option<Array<'py>>,
         platform_axes: bool,
     ) -> PyResult<Bound<'py, PyDict>> {
-        let states = states(&poses, &twists, &accelerations)?;
-        let loads = loads(wrenches.as_ref(), platform_axes, states.poses)?;
-        let table = py.detach(|| batch::power(&self.0, &states, &loads));
-        arrays(py, table)
+        let motion = [&poses, &twists, &accelerations];
+        self.loaded(py, motion, wrenches.as_ref(), platform_axes, batch::power)
     }
 
     #[pyo3(signature = (poses, twists, accelerations, wrenches, platform_axes))]
@@ -326,10 +331,8 @@ impl PyMechanism {
         wrenches: Option<Array<'py>>,
         platform_axes: bool,
     ) -> PyResult<Bound<'py, PyDict>> {
-        let states = states(&poses, &twists, &accelerations)?;
-        let loads = loads(wrenches.as_ref(), platform_axes, states.poses)?;
-        let table = py.detach(|| batch::limits(&self.0, &states, &loads));
-        arrays(py, table)
+        let motion = [&poses, &twists, &accelerations];
+        self.loaded(py, motion, wrenches.as_ref(), platform_axes, batch::limits)
     }
 
     /// Name, kind, legs (from 0), unit, least and greatest value (infinite where there is none) and scale of each limit.

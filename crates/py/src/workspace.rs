@@ -31,13 +31,6 @@ fn start_pose(start: &Array<'_>) -> PyResult<Pose<f64>> {
     if start.len() == 16 { Ok(pose_of(start)) } else { Err(PyValueError::new_err("needs one start pose")) }
 }
 
-fn matrix_of(pose: &Pose<f64>) -> [f64; 16] {
-    let ([x, y, z], o) = (pose.rotation.rows(), pose.o.array());
-    let row = |r: [f64; 3], o: f64| [r[0], r[1], r[2], o];
-    let rows = [row(x, o[0]), row(y, o[1]), row(z, o[2]), [0.0, 0.0, 0.0, 1.0]];
-    std::array::from_fn(|i| rows[i / 4][i % 4])
-}
-
 /// The poses (n, 4, 4) inside all limits next to given ones with the same o; NaN where the search finds none.
 #[pyfunction]
 pub fn fit_poses<'py>(
@@ -51,7 +44,7 @@ pub fn fit_poses<'py>(
     }
     let fitted = poses.chunks_exact(16).flat_map(|matrix| {
         let pose = pose_of(matrix);
-        fit(mech.get().core(), &pose, pose.o).map_or([f64::NAN; 16], |pose| matrix_of(&pose))
+        fit(mech.get().core(), &pose, pose.o).map_or([f64::NAN; 16], |pose| pose.matrix())
     });
     PyArray1::from_vec(py, fitted.collect()).reshape([poses.len() / 16, 4, 4])
 }
@@ -110,7 +103,7 @@ impl PyFlood {
             Stop::Grid => GRID,
             Stop::Search => SEARCH,
         };
-        let poses: Vec<f64> = edges.iter().flat_map(|edge| matrix_of(&edge.pose)).collect();
+        let poses: Vec<f64> = edges.iter().flat_map(|edge| edge.pose.matrix()).collect();
         let n = edges.len();
         let result = PyDict::new(py);
         result.set_item("node", PyArray1::from_vec(py, edges.iter().map(|e| e.node as i64).collect()))?;

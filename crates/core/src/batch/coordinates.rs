@@ -69,7 +69,7 @@ pub fn states(mech: &Mechanism, input: &Coordinates, n: usize) -> Table {
             if state.status == Status::Ok {
                 (last, branch) = (state.platform.pose, state.branch);
             }
-            table.set_pose(poses, i, &state.platform.pose);
+            table.set(poses, i, 0, &state.platform.pose.matrix());
         }
         if table.status[i] == Status::Ok {
             table.set(twists, i, 0, &state.platform.twist.array());

@@ -7,7 +7,7 @@ use crate::leg;
 use crate::mechanism::Mechanism;
 use crate::mobility;
 use crate::real::Dual;
-use crate::spatial::{Motion, Pose, Twist, Vec3, Wrench};
+use crate::spatial::{Motion, Pose, Twist, Wrench};
 use crate::spec::Axes;
 use crate::status::Status;
 
@@ -141,9 +141,7 @@ pub fn power(mech: &Mechanism, states: &States, loads: &Loads) -> Table {
 /// Kinetic and potential energy as duals along the motion.
 fn energy_along(mech: &Mechanism, platform: &Motion<f64>) -> (Dual<f64>, Dual<f64>) {
     let Motion { pose, twist, acceleration } = platform;
-    let dual =
-        |x: Vec3<f64>, d: Vec3<f64>| Vec3::new(Dual::new(x.x, d.x), Dual::new(x.y, d.y), Dual::new(x.z, d.z));
     let moving = pose.along(twist);
-    let twist = Twist::new(dual(twist.v, acceleration.a), dual(twist.omega, acceleration.eps));
+    let twist = Twist::new(twist.v.with_rate(acceleration.a), twist.omega.with_rate(acceleration.eps));
     dynamics::energy(mech, &moving, &twist)
 }

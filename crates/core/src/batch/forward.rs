@@ -46,7 +46,7 @@ pub fn forward_kinematics(
         let status = then(status, || check_found(mech, &pose, residual));
         table.status[i] = status;
         if !matches!(status, Status::NotConverged | Status::InvalidInput) {
-            table.set_pose(poses, i, &pose);
+            table.set(poses, i, 0, &pose.matrix());
             table.set(residuals, i, 0, &[residual]);
         }
         table.set(iterations, i, 0, &[f64::from(steps)]);
@@ -91,7 +91,7 @@ pub fn assembly_modes(mech: &Mechanism, start: &Start, lengths: &[f64]) -> AllMo
     let (mut table, [poses, sign, above, multiplicity, residual]) =
         Table::new(all.len(), [("pose", vec![4, 4]), sign, above, multiplicity, residual]);
     for (i, mode) in all.iter().enumerate() {
-        table.set_pose(poses, i, &mode.pose);
+        table.set(poses, i, 0, &mode.pose.matrix());
         table.set(sign, i, 0, &[if mode.singular { 0.0 } else { mode.sign }]);
         table.set(above, i, 0, &[f64::from(u8::from(mode.above))]);
         table.set(multiplicity, i, 0, &[f64::from(mode.multiplicity)]);

@@ -62,15 +62,6 @@ impl Table {
         (table, std::array::from_fn(FieldId))
     }
 
-    /// Writes a pose as a homogeneous matrix.
-    fn set_pose(&mut self, field: FieldId, state: usize, pose: &Pose<f64>) {
-        let (r, o) = (pose.rotation.rows(), pose.o.array());
-        for k in 0..3 {
-            self.set(field, state, k, &[r[k][0], r[k][1], r[k][2], o[k]]);
-        }
-        self.set(field, state, 3, &[0.0, 0.0, 0.0, 1.0]);
-    }
-
     /// Writes `values` as the `part`-th piece of that size in the state's row.
     fn set(&mut self, field: FieldId, state: usize, part: usize, values: &[f64]) {
         let field = &mut self.fields[field.0];

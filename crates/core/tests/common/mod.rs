@@ -38,6 +38,16 @@ pub fn every_leg() -> Vec<String> {
     letters.iter().flat_map(|base| letters.iter().map(move |platform| format!("{base}P{platform}"))).collect()
 }
 
+/// Every leg of the catalogue, rods with one to three legs, and the published manipulator.
+pub fn mechanisms() -> Vec<Mechanism> {
+    every_leg()
+        .iter()
+        .enumerate()
+        .map(|(i, letters)| with_leg(letters, i as u64 + 1))
+        .chain([on_rod(1, 3), on_rod(2, 4), on_rod(3, 5), published()])
+        .collect()
+}
+
 fn body(draw: &mut Draw, symmetric: bool) -> serde_json::Value {
     // A sum of point masses is the inertia of a body that exists.
     let mut inertia = [[0.0; 3]; 3];
