@@ -209,6 +209,38 @@ def test_near_tells_where_there_is_no_pose(run, mech, path):
     assert read_json(run("fk", NAME, path, "--near", "--json"), 1)["rows"][0]["modes"] == []
 
 
+def test_follow_begins_with_a_mode_of_the_first_row(run, mech, path):
+    """The published home is nearly singular: from there the rows are not reached, from a mode they are."""
+    known = poses(mech, 5)
+    write(path, mech.inverse_kinematics(known).lengths)
+    first = read_json(run("fk", NAME, path, "--json"))["rows"][0]
+    number = int(np.argmin(distances(first, known[0]))) + 1
+    facts = read_json(run("fk", NAME, path, "--follow", number, "--json"))
+    for row, pose in zip(facts["rows"], known, strict=True):
+        (mode,) = row["modes"]
+        assert distances(row, pose)[0] < 1e-9
+        assert (mode["mode"], row["status"]) == (number, "OK")
+    near = run("fk", NAME, path, "--near", "--json")
+    assert {row["status"] for row in json.loads(near[1])["rows"]} <= {"NOT_CONVERGED", "MODE_JUMP"}
+
+
+@pytest.mark.parametrize(("rows", "has"), [(None, "modes 1 to 8"), ([NOWHERE], "no mode")])
+def test_a_mode_that_is_none_cannot_be_followed(run, mech, path, rows, has):
+    write(path, mech.inverse_kinematics(poses(mech)).lengths if rows is None else rows)
+    message = f"polypod: mode 9 cannot be followed: the first row of lengths has {has}\n"
+    assert run("fk", NAME, path, "--follow", 9) == (2, "", message)
+
+
+def test_the_table_is_whole_in_80_columns(run, mech, path, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    lengths = mech.inverse_kinematics(poses(mech)).lengths
+    write(path, lengths)
+    out = run("fk", NAME, path)[1]
+    for pose in mech.assembly_modes(lengths[0]).pose:
+        assert ", ".join(f"{1e3 * x:.1f}" for x in pose[:3, 3]) in out
+    assert "…" not in out
+
+
 # --- result file --------------------------------------------------------------------------------------------
 
 

@@ -353,6 +353,29 @@ def independent(mech: pp.Mechanism, pose: Array) -> dict[str, Array]:
 
 
 @pytest.mark.parametrize("mech", MECHANISMS.values(), ids=MECHANISMS)
+def test_far_lengths_are_those_of_many_small_steps(mech: pp.Mechanism):
+    """In one call, the pose at the end of the straight path of squared lengths that begins at the guess."""
+    rng = np.random.default_rng(16)
+    guess, lengths = sampled(mech, rng, 60), lengths_at(mech, sampled(mech, rng, 60))
+    share = np.linspace(0, 1, 1001)[:, None, None]
+    path = np.sqrt((1 - share) * lengths_at(mech, guess) ** 2 + share * lengths**2)
+    found = mech.forward_kinematics(lengths, guess)
+    pose, status = guess, np.full(60, Status.OK)
+    for step in path[1:]:
+        small = mech.forward_kinematics(step, pose)
+        follows = np.isin(status, ANSWERS) & np.isin(small.status, ANSWERS)
+        status = np.where(follows, small.status, Status.MODE_JUMP)
+        pose = np.where(follows[:, None, None], small.pose, pose)
+    arrived = np.isin(status, ANSWERS)
+    assert arrived.sum() > 10
+    # Where the path all but touches a singularity, only one of the two may pass.
+    answered = np.isin(found.status, ANSWERS)
+    assert (answered == arrived).sum() >= 58
+    both = answered & arrived
+    assert differs(found.pose[both], pose[both]).max() < 1e-8
+
+
+@pytest.mark.parametrize("mech", MECHANISMS.values(), ids=MECHANISMS)
 def test_nearby_is_quick(mech: pp.Mechanism):
     """Newton's method is quadratic: half a millimetre off, four steps or so."""
     pose = sampled(mech, np.random.default_rng(12), 50, 0.5)

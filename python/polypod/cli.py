@@ -417,9 +417,18 @@ def fk(
     near: Annotated[
         bool, typer.Option("--near", help="Follow one pose from home along the rows instead of finding all.")
     ] = False,
+    mode: Annotated[
+        int | None,
+        typer.Option(
+            "--follow",
+            min=1,
+            metavar="MODE",
+            help="The same from this mode of the first row instead of home.",
+        ),
+    ] = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Find the poses that have given leg lengths: all assembly modes, or the one near home.
+    """Find the poses that have given leg lengths: all assembly modes, or one that is followed along the rows.
 
     The exit status is 1 if a row has no pose, or if one of its poses may be missing.
     """
@@ -431,7 +440,8 @@ def fk(
     mech = load(mechanism)
     sets = load_lengths(lengths, mech)
     with _working("finding poses"):
-        facts = (tabulate_continued if near else tabulate_modes)(mech, sets)
+        one = near or mode is not None
+        facts = tabulate_continued(mech, sets, mode) if one else tabulate_modes(mech, sets)
     if result is not None:
         save_table(facts, mech, result)
     if as_json:
@@ -445,6 +455,7 @@ def fk(
 
 
 def _print_poses(out: Console, facts: dict[str, Any]) -> None:
+    """One table; narrow, so that position and status stay whole where there is room for 80 characters."""
     from polypod.units import KIND_OF_COORDINATE, from_si
 
     rows = [(row, mode) for row in facts["rows"] for mode in row["modes"]]
@@ -453,6 +464,8 @@ def _print_poses(out: Console, facts: dict[str, Any]) -> None:
         angles = [name for name in coordinates if KIND_OF_COORDINATE[name] == "angle"]
         headers = ["row>", "mode>", "o / mm>", *(f"{name} / deg>" for name in angles)]
         poses = _table(f"Poses of {escape(facts['mechanism'])}", *headers, "side", "det J", "status")
+        poses.box, poses.pad_edge, poses.collapse_padding = None, False, True
+        poses.columns[2].no_wrap, poses.columns[-1].overflow = True, "fold"
         for row, mode in rows:
             position = ", ".join(f"{1e3 * line[3]:.1f}" for line in mode["pose"][:3])
             turns = [mode["coordinates"][name] for name in angles]

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from polypod.columns import columns_to_si, read_header, read_numbers, read_rows
-from polypod.errors import Fault, LengthsError
+from polypod.errors import CoordinateError, Fault, LengthsError
 from polypod.mechanism import Mechanism
 from polypod.status import Status
 from polypod.units import KIND_OF_COORDINATE, si_unit
@@ -86,27 +86,42 @@ def tabulate_modes(mech: Mechanism, lengths: ArrayLike) -> dict[str, Any]:
     return _table(mech, rows)
 
 
-def tabulate_continued(mech: Mechanism, lengths: ArrayLike) -> dict[str, Any]:
-    """The pose with each set of leg lengths (N, n), m, followed from home along the rows [T25-T27].
+def tabulate_continued(mech: Mechanism, lengths: ArrayLike, mode: int | None = None) -> dict[str, Any]:
+    """The pose with each set of leg lengths (N, n), m, followed along the rows [T25-T27].
 
+    From home, or from a mode of the first row, counted from 1 as `tabulate_modes` does. From a home that is
+    nearly singular, as the published one, few lengths are reached.
     The form is that of `tabulate_modes`, with at most one mode in a row; the side of the base and how many
     modes meet are None, as one pose alone does not tell them.
+
+    Raises:
+        CoordinateError: the first row has no mode of that number.
     """
-    found = mech.forward_kinematics(lengths, continued=True)
+    guess = None if mode is None else _mode_of_first_row(mech, np.asarray(lengths), mode)
+    found = mech.forward_kinematics(lengths, guess, continued=True)
     coordinates = mech.coordinates(found.pose)
     sign = np.sign(mech.determinant(found.pose).determinant)
     rows = []
     for i, code in enumerate(found.status.tolist()):
         modes = []
         if np.isfinite(found.pose[i]).all():
-            mode = _pose(found.pose[i], {name: q[i] for name, q in coordinates.items()}, 1)
-            mode["determinant_sign"] = int(sign[i]) if math.isfinite(sign[i]) else None
-            mode["above"] = mode["multiplicity"] = None
-            mode["residual"] = float(found.residual[i])
-            mode["status"] = Status(code).name
-            modes.append(mode)
+            pose = _pose(found.pose[i], {name: q[i] for name, q in coordinates.items()}, mode or 1)
+            pose["determinant_sign"] = int(sign[i]) if math.isfinite(sign[i]) else None
+            pose["above"] = pose["multiplicity"] = None
+            pose["residual"] = float(found.residual[i])
+            pose["status"] = Status(code).name
+            modes.append(pose)
         rows.append(_row(i + 1, Status(code), modes))
     return _table(mech, rows)
+
+
+def _mode_of_first_row(mech: Mechanism, lengths: Array, mode: int) -> Array:
+    first = mech.assembly_modes(lengths[0])
+    if not 1 <= mode <= first.number:
+        has = f"modes 1 to {first.number}" if first.number else "no mode"
+        raise CoordinateError(f"mode {mode} cannot be followed: the first row of lengths has {has}")
+    pose: Array = first.pose[mode - 1]
+    return pose
 
 
 def _pose(pose: Array, coordinates: dict[str, Any], number: int) -> dict[str, Any]:
