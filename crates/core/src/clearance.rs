@@ -1,14 +1,14 @@
 //! How far apart struts are from each other and from the platform: distances between segments, and between a
 //! segment and a convex body \[T37\]. All are exact, also for parallel, crossing and vanishing segments.
 
-use crate::real::Real;
+use crate::real::Scalar;
 use crate::spatial::Vec3;
 
 /// From its first point to its second.
 #[derive(Clone, Copy, Debug)]
 pub struct Segment<T>(pub Vec3<T>, pub Vec3<T>);
 
-impl<T: Real> Segment<T> {
+impl<T: Scalar> Segment<T> {
     #[inline(always)]
     fn vector(&self) -> Vec3<T> {
         self.1 - self.0
@@ -31,26 +31,26 @@ impl<T: Real> Segment<T> {
 }
 
 #[inline(always)]
-fn least<T: Real>(a: T, b: T) -> T {
+fn least<T: Scalar>(a: T, b: T) -> T {
     T::select(b.value() < a.value(), b, a)
 }
 
 /// A quotient as a share of a segment: within [0, 1], 0 for 0/0.
 #[inline(always)]
-fn share<T: Real>(numerator: T, denominator: T) -> T {
+fn share<T: Scalar>(numerator: T, denominator: T) -> T {
     let t = T::select(denominator.value() > 0.0, numerator / denominator, T::zero());
     let t = T::select(t.value() < 0.0, T::zero(), t);
     least(t, T::one())
 }
 
 #[inline(always)]
-fn square<T: Real>(a: Vec3<T>) -> T {
+fn square<T: Scalar>(a: Vec3<T>) -> T {
     a.dot(a)
 }
 
 /// Squared distance of a point from a segment.
 #[inline(always)]
-fn to_point<T: Real>(s: &Segment<T>, p: Vec3<T>) -> T {
+fn to_point<T: Scalar>(s: &Segment<T>, p: Vec3<T>) -> T {
     let u = s.vector();
     square(p - s.at(share((p - s.0).dot(u), square(u))))
 }
@@ -61,7 +61,7 @@ fn to_point<T: Real>(s: &Segment<T>, p: Vec3<T>) -> T {
 /// derivatives vanish, or at an edge, which is an end of one segment against the other. For parallel segments
 /// the inner point is not determined, but then an edge is as low; any point of the square will do as a candidate.
 #[inline(always)]
-fn squared_distance<T: Real>(a: &Segment<T>, b: &Segment<T>) -> T {
+fn squared_distance<T: Scalar>(a: &Segment<T>, b: &Segment<T>) -> T {
     let ends = least(least(to_point(b, a.0), to_point(b, a.1)), least(to_point(a, b.0), to_point(a, b.1)));
     let (u, v, w) = (a.vector(), b.vector(), a.0 - b.0);
     let (uu, uv, vv) = (square(u), u.dot(v), square(v));
@@ -71,7 +71,7 @@ fn squared_distance<T: Real>(a: &Segment<T>, b: &Segment<T>) -> T {
 
 /// Distance between two segments \[T37\].
 #[inline(always)]
-pub fn distance<T: Real>(a: &Segment<T>, b: &Segment<T>) -> T {
+pub fn distance<T: Scalar>(a: &Segment<T>, b: &Segment<T>) -> T {
     squared_distance(a, b).sqrt()
 }
 
@@ -101,19 +101,19 @@ impl Facet {
         self.corners.len() > 2
     }
 
-    fn height<T: Real>(&self, p: Vec3<T>) -> T {
+    fn height<T: Scalar>(&self, p: Vec3<T>) -> T {
         Vec3::lift(self.normal).dot(p - Vec3::lift(self.corners[0]))
     }
 
     /// Whether the point's foot in the plane is in the polygon.
-    fn is_over<T: Real>(&self, p: Vec3<T>) -> bool {
+    fn is_over<T: Scalar>(&self, p: Vec3<T>) -> bool {
         let inside = |(corner, inward): (&Vec3<f64>, &Vec3<f64>)| {
             Vec3::lift(*inward).dot(p - Vec3::lift(*corner)).value() >= 0.0
         };
         self.is_polygon() && self.corners.iter().zip(&self.inward).all(inside)
     }
 
-    fn squared_distance<T: Real>(&self, s: &Segment<T>) -> T {
+    fn squared_distance<T: Scalar>(&self, s: &Segment<T>) -> T {
         let next = self.corners.iter().cycle().skip(1);
         let edges = self.corners.iter().zip(next).map(|(a, b)| Segment(Vec3::lift(*a), Vec3::lift(*b)));
         let mut result = edges.map(|edge| squared_distance(s, &edge)).fold(T::lit(f64::INFINITY), least);
@@ -152,7 +152,7 @@ impl Hull {
 
     /// Distance of a segment from the body, zero where they meet \[T37\].
     #[must_use]
-    pub fn distance<T: Real>(&self, s: &Segment<T>) -> T {
+    pub fn distance<T: Scalar>(&self, s: &Segment<T>) -> T {
         let nearest = self.0.iter().map(|f| f.squared_distance(s)).fold(T::lit(f64::INFINITY), least).sqrt();
         let solid = self.0.len() > 1;
         let inside = solid && self.0.iter().all(|f| f.height(s.0).value() <= 0.0);

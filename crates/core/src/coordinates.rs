@@ -426,7 +426,7 @@ fn solve_dependent(
         return (Status::NotConverged, f64::NAN);
     }
     let matrix = gradient(mech, set, q, &dependent);
-    let rates = |q: &Values<Jet<f64>>, part: fn(Jet<f64>) -> f64| -> Solved<f64, MAX_CONSTRAINTS> {
+    let rates = |q: &Values<Jet<f64>>, part: fn(Jet<f64>) -> f64| -> Solved<f64, [f64; MAX_CONSTRAINTS]> {
         let pose = set.pose(mech, q);
         let rhs = std::array::from_fn(|k| {
             mech.independent

@@ -1,7 +1,6 @@
 //! Random numbers that are the same every time: any fixed generic direction will do.
 
-use nalgebra::Complex;
-
+use crate::complex::Complex;
 use crate::spatial::Vec3;
 
 /// The generator xorshift64*.

@@ -98,7 +98,11 @@ pub fn resultant<T: Real>(mech: &Mechanism, platform: &Motion<T>, load: Wrench<T
 /// Active forces along the actuated legs, then the multipliers of the independent constraints:
 /// `F_r = -J⁻ᵀ {...}` [Eq. 43], with the pivot ratio of J.
 #[inline(always)]
-pub fn inverse_dynamics<T: Real>(mech: &Mechanism, platform: &Motion<T>, load: Wrench<T>) -> ([T; 6], f64) {
+pub fn inverse_dynamics<T: Real>(
+    mech: &Mechanism,
+    platform: &Motion<T>,
+    load: Wrench<T>,
+) -> ([T; 6], T::Value) {
     let w = resultant(mech, platform, load);
     let scaled = Wrench::new(w.force, w.torque * T::lit(1.0 / mech.characteristic_length));
     let solved = solve(transposed(&scaled_jacobian(mech, &platform.pose)), scaled.array().map(|x| -x));

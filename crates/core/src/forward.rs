@@ -57,23 +57,35 @@ pub struct System<T> {
 #[inline(always)]
 pub fn system<T: Real>(mech: &Mechanism, pose: &Pose<T>, squares: &[T; 6]) -> System<T> {
     let scale = mech.characteristic_length;
-    let square = 1.0 / (scale * scale);
-    let mut residual = [T::zero(); 6];
-    let mut matrix = [[T::zero(); 6]; 6];
-    let legs = mech.actuated().zip(squares).map(|((_, leg), &length_square)| {
+    let mut system = System { residual: [T::zero(); 6], matrix: [[T::zero(); 6]; 6] };
+    let mut count = 0;
+    for (_, leg) in mech.actuated() {
         let (e, r) = leg::vectors(leg, pose);
-        ((r.dot(r) - length_square).scale(0.5 * square), Wrench::at(e, r), square)
-    });
-    let constraints = mech.independent.iter().map(|c| {
-        let unit = 1.0 / constraint::unit(c, scale);
-        (constraint::value(c, pose).scale(unit), constraint::row(c, pose), unit)
-    });
-    for (i, (value, Wrench { force, torque }, unit)) in legs.chain(constraints).enumerate() {
-        residual[i] = value;
-        let (a, b) = (force.map(|x| x.scale(unit * scale)), torque.map(|x| x.scale(unit)));
-        matrix[i] = [a.x, a.y, a.z, b.x, b.y, b.z];
+        system.put(count, scale, (r.dot(r) - squares[count]).scale(0.5), Wrench::at(e, r), scale * scale);
+        count += 1;
     }
-    System { residual, matrix }
+    for c in &mech.independent {
+        system.put(
+            count,
+            scale,
+            constraint::value(c, pose),
+            constraint::row(c, pose),
+            constraint::unit(c, scale),
+        );
+        count += 1;
+    }
+    system
+}
+
+impl<T: Real> System<T> {
+    /// Sets an equation, made a pure number by dividing it by `unit`.
+    #[inline(always)]
+    fn put(&mut self, i: usize, scale: f64, value: T, row: Wrench<T>, unit: f64) {
+        let unit = 1.0 / unit;
+        let (a, b) = (row.force.scale(unit * scale), row.torque.scale(unit));
+        self.residual[i] = value.scale(unit);
+        self.matrix[i] = [a.x, a.y, a.z, b.x, b.y, b.z];
+    }
 }
 
 /// The squared lengths of the actuated legs, in the order of the equations.

@@ -52,7 +52,7 @@ pub fn hessian<T: Real>(mech: &Mechanism, pose: &Pose<T>) -> [Hessian<T>; 6] {
 
 /// The platform's twist from the rates of the actuated legs, and the pivot ratio of J [Eq. 13].
 #[inline(always)]
-pub fn platform_twist<T: Real>(mech: &Mechanism, pose: &Pose<T>, rates: &[T]) -> (Twist<T>, f64) {
+pub fn platform_twist<T: Real>(mech: &Mechanism, pose: &Pose<T>, rates: &[T]) -> (Twist<T>, T::Value) {
     let solved = solve(scaled_jacobian(mech, pose), padded(rates));
     (Twist::from_array(unscaled(mech, solved.x)), solved.pivots)
 }
@@ -64,7 +64,7 @@ pub fn platform_acceleration<T: Real>(
     pose: &Pose<T>,
     twist: &Twist<T>,
     accelerations: &[T],
-) -> (Acceleration<T>, f64) {
+) -> (Acceleration<T>, T::Value) {
     let mut rhs = padded(accelerations);
     let v = twist.array();
     for (entry, h) in rhs.iter_mut().zip(hessian(mech, pose)) {

@@ -2,7 +2,7 @@
 
 use crate::mechanism::{Leg, Side, Turning};
 use crate::quadratic::{Hessian, add_centripetal, point_columns};
-use crate::real::Real;
+use crate::real::{Ordered, Real};
 use crate::spatial::{Mat3, Motion, Pose, Vec3, Wrench};
 
 /// Where the leg is, base axes \[T1\].
@@ -124,7 +124,7 @@ pub fn frame<T: Real>(leg: &Leg, pose: &Pose<T>, p: &Position<T>) -> Frame<T> {
         // Any direction will do; the second is for a leg that comes near the first.
         Turning::Free(first) => {
             let (a, b) = (u.cross(p.delta), Vec3::lift(first.perpendicular()).cross(p.delta));
-            let clear = a.dot(a).value() > 0.25;
+            let clear = a.dot(a).value().greater(T::Value::lit(0.25));
             Vec3::new(T::select(clear, a.x, b.x), T::select(clear, a.y, b.y), T::select(clear, a.z, b.z))
         }
         Turning::Along(..) => u,

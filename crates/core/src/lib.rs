@@ -6,6 +6,7 @@
 pub mod assembly;
 pub mod batch;
 pub mod clearance;
+pub mod complex;
 pub mod constraint;
 pub mod coordinates;
 mod draw;
@@ -13,6 +14,7 @@ pub mod dynamics;
 pub mod forward;
 pub mod jacobian;
 pub mod joints;
+pub mod lanes;
 pub mod lattice;
 pub mod leg;
 pub mod limits;
@@ -21,6 +23,7 @@ pub mod mechanism;
 pub mod mobility;
 pub mod modes;
 pub mod nearest;
+pub mod paths;
 pub mod quadratic;
 pub mod reach;
 pub mod real;
@@ -30,3 +33,10 @@ pub mod spatial;
 pub mod spec;
 pub mod status;
 pub mod workspace;
+
+// The tests of the modules use the mechanisms of the other tests.
+#[cfg(test)]
+#[path = "../tests/common/mod.rs"]
+mod common;
+#[cfg(test)]
+extern crate self as polypod_core;

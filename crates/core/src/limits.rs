@@ -9,7 +9,7 @@ use crate::clearance::{Hull, Segment, distance};
 use crate::joints::{self, Zero};
 use crate::leg;
 use crate::mechanism::{Leg, Mechanism, Side};
-use crate::real::{Real, Trig};
+use crate::real::{Scalar, Trig};
 use crate::singularity;
 use crate::spatial::{Pose, Vec3};
 use crate::spec::{JointSpec, LegSpec, LimitsSpec, RodSpec, Spec};
@@ -179,13 +179,13 @@ impl Limit {
 }
 
 impl Strut {
-    fn in_base<T: Real>(&self, mech: &Mechanism, pose: &Pose<T>) -> Segment<T> {
+    fn in_base<T: Scalar>(&self, mech: &Mechanism, pose: &Pose<T>) -> Segment<T> {
         let leg = &mech.legs[self.leg];
         let b = pose.o + pose.rotation * Vec3::lift(leg.platform.point);
         Segment(Vec3::lift(leg.base.point), b).without(self.cut)
     }
 
-    fn in_platform<T: Real>(&self, mech: &Mechanism, pose: &Pose<T>) -> Segment<T> {
+    fn in_platform<T: Scalar>(&self, mech: &Mechanism, pose: &Pose<T>) -> Segment<T> {
         let leg = &mech.legs[self.leg];
         let foot = pose.rotation.transpose_mul(Vec3::lift(leg.base.point) - pose.o);
         Segment(foot, Vec3::lift(leg.platform.point)).without(self.cut)

@@ -1,36 +1,49 @@
 //! The small linear system of the kernels, solved without a branch on a value.
 
-use crate::real::Real;
+use crate::real::{Ordered, Real};
 
-/// A solution, and what the elimination tells of the matrix.
+/// Solutions, and what the elimination tells of the matrix.
 #[derive(Clone, Copy, Debug)]
-pub struct Solved<T, const N: usize> {
-    pub x: [T; N],
+pub struct Solved<T: Real, X> {
+    pub x: X,
     /// Ratio of the smallest to the largest pivot: zero (or NaN) where the matrix is singular, of the order of the
     /// reciprocal condition number elsewhere.
-    pub pivots: f64,
+    pub pivots: T::Value,
     /// Sign of the determinant.
-    pub sign: f64,
+    pub sign: T::Value,
 }
 
-/// Solves `m x = rhs` by Gaussian elimination with partial pivoting, rows exchanged by [`Real::select`].
+/// Solves `m x = rhs`.
 #[inline(always)]
-pub fn solve<T: Real, const N: usize>(mut m: [[T; N]; N], mut rhs: [T; N]) -> Solved<T, N> {
-    let mut sign = 1.0_f64;
+pub fn solve<T: Real, const N: usize>(m: [[T; N]; N], rhs: [T; N]) -> Solved<T, [T; N]> {
+    let Solved { x: [x], pivots, sign } = solve_all(m, [rhs]);
+    Solved { x, pivots, sign }
+}
+
+/// Solves `m x = rhs` for several right-hand sides by Gaussian elimination with partial pivoting, rows exchanged by
+/// [`Real::select`].
+#[inline(always)]
+pub fn solve_all<T: Real, const N: usize, const M: usize>(
+    mut m: [[T; N]; N],
+    mut rhs: [[T; N]; M],
+) -> Solved<T, [[T; N]; M]> {
+    let mut sign = T::Value::one();
     let mut inverses = [T::zero(); N];
     for k in 0..N {
         // Bubble the largest entry of column k up to the diagonal.
         for i in k + 1..N {
-            let larger = m[i][k].value().abs() > m[k][k].value().abs();
+            let larger = m[i][k].value().abs().greater(m[k][k].value().abs());
             for j in k..N {
                 let (a, b) = (m[k][j], m[i][j]);
                 m[k][j] = T::select(larger, b, a);
                 m[i][j] = T::select(larger, a, b);
             }
-            sign = if larger { -sign } else { sign };
-            let (a, b) = (rhs[k], rhs[i]);
-            rhs[k] = T::select(larger, b, a);
-            rhs[i] = T::select(larger, a, b);
+            sign = T::Value::select(larger, -sign, sign);
+            for x in &mut rhs {
+                let (a, b) = (x[k], x[i]);
+                x[k] = T::select(larger, b, a);
+                x[i] = T::select(larger, a, b);
+            }
         }
         inverses[k] = T::one() / m[k][k];
         for i in k + 1..N {
@@ -38,21 +51,25 @@ pub fn solve<T: Real, const N: usize>(mut m: [[T; N]; N], mut rhs: [T; N]) -> So
             for j in k + 1..N {
                 m[i][j] = factor.mul_add(m[k][j], m[i][j]);
             }
-            rhs[i] = factor.mul_add(rhs[k], rhs[i]);
+            for x in &mut rhs {
+                x[i] = factor.mul_add(x[k], x[i]);
+            }
         }
     }
-    let mut pivots = (f64::INFINITY, 0.0_f64);
+    let (mut least, mut most) = (T::Value::lit(f64::INFINITY), T::Value::zero());
     for k in (0..N).rev() {
-        let mut sum = rhs[k];
-        for j in k + 1..N {
-            sum = (-m[k][j]).mul_add(rhs[j], sum);
+        for x in &mut rhs {
+            let mut sum = x[k];
+            for j in k + 1..N {
+                sum = (-m[k][j]).mul_add(x[j], sum);
+            }
+            x[k] = sum * inverses[k];
         }
-        rhs[k] = sum * inverses[k];
         let pivot = m[k][k].value();
-        sign *= pivot.signum();
-        pivots = (pivots.0.min(pivot.abs()), pivots.1.max(pivot.abs()));
+        sign = sign * pivot.signum();
+        (least, most) = (least.least(pivot.abs()), most.most(pivot.abs()));
     }
-    Solved { x: rhs, pivots: pivots.0 / pivots.1, sign }
+    Solved { x: rhs, pivots: least / most, sign }
 }
 
 /// The determinant by expansion along the rows, each minor once: `d[S]` is that of the first |S| rows and the columns

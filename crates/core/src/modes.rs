@@ -4,19 +4,16 @@
 //! number of solutions for almost all lengths. All of them are found once for generic complex lengths; from there they
 //! are followed along a path of lengths to the ones that are asked for, and the real ones kept.
 
-use nalgebra::Complex;
-
 use crate::draw::Draw;
-use crate::forward::{self, FOLD_PIVOTS, Found, System, step_of, system};
+use crate::forward::{self, Found, System, step_of, system};
 use crate::leg;
 use crate::linear::solve;
 use crate::mechanism::Mechanism;
 use crate::mobility::count;
+use crate::paths::{C, End, INFINITE, Path, modulus};
 use crate::real::Real;
 use crate::spatial::{Mat3, Pose, Vec3};
 use crate::status::Status;
-
-type C = Complex<f64>;
 
 /// Error of a predicted step that a path is followed with, as a pure number; the later ones where paths came too close
 /// to each other.
@@ -24,27 +21,6 @@ const PRECISIONS: [f64; 3] = [3e-2, 1e-4, 1e-6];
 
 /// Precision of the search for the generic solutions, which is made once.
 const CLOSE: f64 = 1e-4;
-
-/// Coordinates, as pure numbers, of a pose beyond which a path is taken to go to infinity: no real pose is there.
-const INFINITE: f64 = 1e5;
-
-/// The same for a path that cannot be followed further in double precision.
-const FAR: f64 = 300.0;
-
-/// The same below which a pose may be a real one.
-const NEARBY: f64 = 100.0;
-
-/// Share of a path that is tried first.
-const FIRST_STEP: f64 = 0.3;
-
-/// Share of a path below which a step is not made shorter.
-const SMALLEST_STEP: f64 = 1e-13;
-
-/// Share of a path that may be left where it ends in a singular pose.
-const NEAR_END: f64 = 1e-9;
-
-/// Size of a Newton step, as a pure number, by which it has converged quadratically.
-const CONVERGED: f64 = 1e-9;
 
 /// Distance, as a pure number, below which two regular solutions are one.
 const SAME: f64 = 1e-7;
@@ -97,8 +73,7 @@ impl Start {
     }
 
     /// Adds a solution for the generic lengths, if it is a new one.
-    fn extend(&mut self, mech: &Mechanism, end: End) {
-        let End::Regular(pose) = end else { return };
+    fn extend(&mut self, mech: &Mechanism, pose: Pose<C>) {
         if self.poses.is_empty() {
             // The reflection is one only if it maps solutions to solutions: axes must agree with it too.
             self.mirror = self.mirror.filter(|m| {
@@ -185,13 +160,15 @@ pub fn start(mech: &Mechanism) -> Option<Start> {
     }
     let mut draw = Draw(0x9E37_79B9_7F4A_7C15);
     let home = squares_at(mech, &Pose::lift(&mech.home));
-    let squares: [C; 6] = std::array::from_fn(|i| home[i] * (C::lit(1.0) + draw.complex() * GENERIC));
+    let squares: [C; 6] = std::array::from_fn(|i| home[i] * (C::lit(1.0) + draw.complex().scale(GENERIC)));
     let mut result = Start { squares, poses: Vec::new(), mirror: Mirror::of(mech) };
     // Every component of the set of complex poses has its own solutions: random poses reach each of them.
     for _ in 0..SEEDS {
         if let Some(pose) = random_pose(mech, &mut draw) {
             let path = Path { mech, from: squares_at(mech, &pose), to: squares, precision: CLOSE };
-            result.extend(mech, path.follow(&pose));
+            for pose in path.follow(&[pose]).into_iter().filter_map(End::regular) {
+                result.extend(mech, pose);
+            }
         }
     }
     // Loops of lengths permute the solutions; one that finds nothing new leaves the known ones among themselves.
@@ -200,17 +177,16 @@ pub fn start(mech: &Mechanism) -> Option<Start> {
         let reach = LOOPS[round % LOOPS.len()];
         let known = result.poses.len();
         let corners: [[C; 6]; 2] = std::array::from_fn(|_| {
-            std::array::from_fn(|i| home[i] * (C::lit(1.0) + draw.complex() * reach))
+            std::array::from_fn(|i| home[i] * (C::lit(1.0) + draw.complex().scale(reach)))
         });
         let sides = [(squares, corners[0]), (corners[0], corners[1]), (corners[1], squares)];
-        for k in 0..known {
-            let mut end = End::Regular(result.poses[k]);
-            for (from, to) in sides {
-                if let End::Regular(pose) = end {
-                    end = Path { mech, from, to, precision: CLOSE }.follow(&pose);
-                }
-            }
-            result.extend(mech, end);
+        let mut poses = result.poses.clone();
+        for (from, to) in sides {
+            let ends = Path { mech, from, to, precision: CLOSE }.follow(&poses);
+            poses = ends.into_iter().filter_map(End::regular).collect();
+        }
+        for pose in poses {
+            result.extend(mech, pose);
         }
         if result.poses.len() > MOST_SOLUTIONS {
             return None;
@@ -261,11 +237,7 @@ fn squares_at(mech: &Mechanism, pose: &Pose<C>) -> [C; 6] {
 }
 
 fn norm(x: &[C; 6]) -> f64 {
-    x.iter().map(C::norm_sqr).sum::<f64>().sqrt()
-}
-
-fn modulus(v: Vec3<C>) -> f64 {
-    (v.x.norm_sqr() + v.y.norm_sqr() + v.z.norm_sqr()).sqrt()
+    x.iter().map(|z| z.norm_sqr()).sum::<f64>().sqrt()
 }
 
 /// Distance of two poses as a pure number: of the columns of R, and of the points o in characteristic lengths, relative
@@ -276,105 +248,6 @@ fn distance(mech: &Mechanism, a: &Pose<C>, b: &Pose<C>) -> f64 {
     let turned = a.rotation.0.iter().zip(b.rotation.0).map(|(&p, q)| modulus(p - q)).fold(0.0, f64::max);
     let moved = modulus(a.o - b.o) / (mech.characteristic_length + modulus(a.o));
     (turned / (size * size)).max(moved / size)
-}
-
-/// How a path ends.
-#[derive(Clone, Copy, Debug)]
-enum End {
-    Regular(Pose<C>),
-    /// At a solution where several paths end.
-    Singular(Pose<C>),
-    Infinite,
-    /// On the way: what it leads to is not known.
-    Lost,
-}
-
-/// A straight path of squared lengths from t = 0 to t = 1.
-struct Path<'a> {
-    mech: &'a Mechanism,
-    from: [C; 6],
-    to: [C; 6],
-    precision: f64,
-}
-
-impl Path<'_> {
-    fn squares(&self, t: f64) -> [C; 6] {
-        std::array::from_fn(|i| self.from[i] + (self.to[i] - self.from[i]) * t)
-    }
-
-    /// The rate of the step coordinates ξ along the path at the pose `start` stepped by ξ: the twist from J, turned into
-    /// the rate of the Cayley map's argument, `w' = ω - w×ω/2 + w (w·ω)/4` \[T29\].
-    fn rate(&self, start: &Pose<C>, xi: &[C; 6], squares: &[C; 6]) -> [C; 6] {
-        let mech = self.mech;
-        let pose = start.stepped(&step_of(mech, *xi, C::lit(1.0)));
-        let System { matrix, .. } = system(mech, &pose, squares);
-        let scale = mech.characteristic_length;
-        let half = 0.5 / (scale * scale);
-        let rhs = std::array::from_fn(|i| (self.to[i] - self.from[i]) * half);
-        let [a, b, c, p, q, r] = solve(matrix, rhs).x;
-        let (w, omega) = (Vec3::new(xi[3], xi[4], xi[5]), Vec3::new(p, q, r));
-        let turned = omega - w.cross(omega) * C::lit(0.5) + w * (w.dot(omega) * 0.25);
-        [a, b, c, turned.x, turned.y, turned.z]
-    }
-
-    /// Newton steps at fixed lengths; the sizes of the first and the last.
-    fn correct(&self, pose: &mut Pose<C>, squares: &[C; 6], steps: usize) -> (f64, f64) {
-        let (mut first, mut last) = (f64::NAN, f64::NAN);
-        for k in 0..steps {
-            let System { residual, matrix } = system(self.mech, pose, squares);
-            let step = solve(matrix, residual.map(|f| -f)).x;
-            *pose = pose.stepped(&step_of(self.mech, step, C::lit(1.0)));
-            last = norm(&step);
-            if k == 0 {
-                first = last;
-            }
-            if !(last > 1e-14) {
-                break;
-            }
-        }
-        let size = 1.0 + modulus(pose.o) / self.mech.characteristic_length;
-        (first / size, last / size)
-    }
-
-    /// Follows the path by the classical Runge-Kutta method and Newton corrections.
-    fn follow(&self, start: &Pose<C>) -> End {
-        let scale = self.mech.characteristic_length;
-        let far = |pose: &Pose<C>| (modulus(pose.o) / scale).max(modulus(pose.rotation.0[0]));
-        let (mut pose, mut t, mut h) = (*start, 0.0_f64, FIRST_STEP);
-        // Before a singular end the path bends like a square root: steps shrink with what is left.
-        while t < 1.0 && h > SMALLEST_STEP {
-            h = h.min(1.0 - t);
-            let (middle, end) = (self.squares(t + 0.5 * h), self.squares(t + h));
-            let along = |k: &[C; 6], share: f64| k.map(|e| e * share);
-            let k1 = self.rate(&pose, &[C::lit(0.0); 6], &self.squares(t));
-            let k2 = self.rate(&pose, &along(&k1, 0.5 * h), &middle);
-            let k3 = self.rate(&pose, &along(&k2, 0.5 * h), &middle);
-            let k4 = self.rate(&pose, &along(&k3, h), &end);
-            let step: [C; 6] = std::array::from_fn(|i| (k1[i] + (k2[i] + k3[i]) * 2.0 + k4[i]) * (h / 6.0));
-            let mut next = pose.stepped(&step_of(self.mech, step, C::lit(1.0)));
-            let (error, rest) = self.correct(&mut next, &end, 2);
-            let good = error <= self.precision && rest <= 0.1 * self.precision * self.precision.max(error);
-            if good {
-                // Large complex rotations would soon leave `RᵀR = 1`.
-                (pose, t) = (Pose { rotation: next.rotation.orthonormalised(), ..next }, t + h);
-            }
-            // The error grows with the fifth power of the step.
-            let factor = 0.8 * (self.precision / error).powf(0.2);
-            let factor = if factor.is_nan() { 0.25 } else { factor.clamp(0.25, 4.0) };
-            h *= if good { factor } else { factor.min(0.5) };
-            if !(far(&pose) < INFINITE) {
-                return End::Infinite;
-            }
-        }
-        if t < 1.0 - NEAR_END {
-            return if far(&pose) > FAR { End::Infinite } else { End::Lost };
-        }
-        let (_, last) = self.correct(&mut pose, &self.to, 40);
-        // Where paths meet, Newton steps may be small by chance: the matrix tells.
-        let System { residual, matrix } = system(self.mech, &pose, &self.to);
-        let determined = far(&pose) > NEARBY || solve(matrix, residual).pivots > FOLD_PIVOTS;
-        if t >= 1.0 && last <= CONVERGED && determined { End::Regular(pose) } else { End::Singular(pose) }
-    }
 }
 
 /// A real pose with the lengths that were asked for.
@@ -412,7 +285,7 @@ pub fn assembly_modes(mech: &Mechanism, start: &Start, lengths: &[f64]) -> Modes
     let mut complete = false;
     for precision in PRECISIONS {
         let path = Path { mech, from: start.squares, to, precision };
-        ends = start.poses.iter().map(|pose| path.follow(pose)).collect::<Vec<End>>();
+        ends = path.follow(&start.poses);
         complete = all_kept(mech, &ends);
         if complete {
             break;

@@ -3,7 +3,8 @@
 //! [`Real`] is what a kernel may use: field operations, a square root, and [`Real::select`] in place of a branch.
 //! `f64` and [`F`] are numbers; [`Dual`] carries one derivative along, [`Jet`] a rate and a second rate, so that the
 //! same source gives values, exact derivatives and exact time histories.
-//! [`Trig`] adds what only coordinate sets need.
+//! [`Trig`] adds what only coordinate sets need, [`Scalar`] names the numbers of a single state, which may be branched on.
+//! Complex numbers and lanes of numbers are in [`complex`](crate::complex) and [`lanes`](crate::lanes).
 
 use std::fmt::Debug;
 use std::ops::{Add, Div, Mul, Neg, Sub};
@@ -19,11 +20,14 @@ pub trait Real:
     + Neg<Output = Self>
     + 'static
 {
+    /// What numbers are compared by.
+    type Value: Ordered;
+
     /// The constant `x`.
     fn lit(x: f64) -> Self;
 
     /// The value without derivatives: for pivoting and for status, never for an answer.
-    fn value(self) -> f64;
+    fn value(self) -> Self::Value;
 
     #[must_use]
     fn sqrt(self) -> Self;
@@ -43,10 +47,7 @@ pub trait Real:
     }
 
     /// `a` where `choose`, else `b`: the kernels' only choice.
-    #[inline(always)]
-    fn select(choose: bool, a: Self, b: Self) -> Self {
-        if choose { a } else { b }
-    }
+    fn select(choose: Mask<Self>, a: Self, b: Self) -> Self;
 
     #[must_use]
     #[inline(always)]
@@ -61,8 +62,42 @@ pub trait Real:
     }
 }
 
+/// Numbers in an order: one, or one in each lane.
+pub trait Ordered: Real<Value = Self> {
+    /// Yes or no, for each lane.
+    type Mask: Copy;
+
+    fn greater(self, than: Self) -> Self::Mask;
+    #[must_use]
+    fn abs(self) -> Self;
+    /// 1 or -1.
+    #[must_use]
+    fn signum(self) -> Self;
+
+    /// The lesser one; this one if they cannot be compared.
+    #[must_use]
+    #[inline(always)]
+    fn least(self, other: Self) -> Self {
+        Self::select(self.greater(other), other, self)
+    }
+
+    /// The greater one; this one if they cannot be compared.
+    #[must_use]
+    #[inline(always)]
+    fn most(self, other: Self) -> Self {
+        Self::select(other.greater(self), other, self)
+    }
+}
+
+/// Where one of two numbers is chosen.
+pub type Mask<T> = <<T as Real>::Value as Ordered>::Mask;
+
+/// A number of a single state: its value is one double.
+pub trait Scalar: Real<Value = f64> {}
+impl<T: Real<Value = f64>> Scalar for T {}
+
 /// Trigonometry, for the coordinate sets only.
-pub trait Trig: Real {
+pub trait Trig: Scalar {
     fn sin_cos(self) -> (Self, Self);
     #[must_use]
     fn acos(self) -> Self;
@@ -72,17 +107,38 @@ pub trait Trig: Real {
 }
 
 impl Real for f64 {
+    type Value = Self;
     #[inline(always)]
     fn lit(x: f64) -> Self {
         x
     }
     #[inline(always)]
-    fn value(self) -> f64 {
+    fn value(self) -> Self {
         self
     }
     #[inline(always)]
     fn sqrt(self) -> Self {
         f64::sqrt(self)
+    }
+    #[inline(always)]
+    fn select(choose: bool, a: Self, b: Self) -> Self {
+        if choose { a } else { b }
+    }
+}
+
+impl Ordered for f64 {
+    type Mask = bool;
+    #[inline(always)]
+    fn greater(self, than: Self) -> bool {
+        self > than
+    }
+    #[inline(always)]
+    fn abs(self) -> Self {
+        f64::abs(self)
+    }
+    #[inline(always)]
+    fn signum(self) -> Self {
+        f64::signum(self)
     }
 }
 
@@ -128,6 +184,7 @@ impl<const FMA: bool> Neg for F<FMA> {
 }
 
 impl<const FMA: bool> Real for F<FMA> {
+    type Value = f64;
     #[inline(always)]
     fn lit(x: f64) -> Self {
         F(x)
@@ -143,6 +200,10 @@ impl<const FMA: bool> Real for F<FMA> {
     #[inline(always)]
     fn mul_add(self, a: Self, b: Self) -> Self {
         if FMA { F(self.0.mul_add(a.0, b.0)) } else { F(self.0 * a.0 + b.0) }
+    }
+    #[inline(always)]
+    fn select(choose: bool, a: Self, b: Self) -> Self {
+        if choose { a } else { b }
     }
 }
 
@@ -202,6 +263,7 @@ impl<T: Real> Neg for Dual<T> {
 }
 
 impl<T: Real> Real for Dual<T> {
+    type Value = T::Value;
     #[inline(always)]
     fn lit(x: f64) -> Self {
         Dual::new(T::lit(x), T::zero())
@@ -211,13 +273,17 @@ impl<T: Real> Real for Dual<T> {
         Dual::new(self.x.scale(x), self.d.scale(x))
     }
     #[inline(always)]
-    fn value(self) -> f64 {
+    fn value(self) -> T::Value {
         self.x.value()
     }
     #[inline(always)]
     fn sqrt(self) -> Self {
         let x = self.x.sqrt();
         Dual::new(x, self.d / (x + x))
+    }
+    #[inline(always)]
+    fn select(choose: Mask<T>, a: Self, b: Self) -> Self {
+        Dual::new(T::select(choose, a.x, b.x), T::select(choose, a.d, b.d))
     }
 }
 
@@ -308,12 +374,13 @@ impl<T: Real> Neg for Jet<T> {
 }
 
 impl<T: Real> Real for Jet<T> {
+    type Value = T::Value;
     #[inline(always)]
     fn lit(x: f64) -> Self {
         Jet::new(T::lit(x), T::zero(), T::zero())
     }
     #[inline(always)]
-    fn value(self) -> f64 {
+    fn value(self) -> T::Value {
         self.x.value()
     }
     #[inline(always)]
@@ -321,6 +388,11 @@ impl<T: Real> Real for Jet<T> {
         let x = self.x.sqrt();
         let f1 = T::lit(0.5) / x;
         self.chain(x, f1, -f1 * T::lit(0.5) / self.x)
+    }
+    #[inline(always)]
+    fn select(choose: Mask<T>, a: Self, b: Self) -> Self {
+        let of = |a: T, b: T| T::select(choose, a, b);
+        Jet::new(of(a.x, b.x), of(a.d, b.d), of(a.dd, b.dd))
     }
 }
 
@@ -344,27 +416,6 @@ impl<T: Trig> Trig for Jet<T> {
         let area_rate = self.dd * b.x - self.x * b.dd;
         let d = area / square.x;
         Jet::new(self.x.atan2(b.x), d, (area_rate - d * square.d) / square.x)
-    }
-}
-
-/// Complex numbers, for polynomial equations only: there is no order, so `value` is a measure of size (the 1-norm), by which
-/// pivots are chosen.
-impl Real for nalgebra::Complex<f64> {
-    #[inline(always)]
-    fn lit(x: f64) -> Self {
-        nalgebra::Complex::new(x, 0.0)
-    }
-    #[inline(always)]
-    fn scale(self, x: f64) -> Self {
-        nalgebra::Complex::new(self.re * x, self.im * x)
-    }
-    #[inline(always)]
-    fn value(self) -> f64 {
-        self.re.abs() + self.im.abs()
-    }
-    #[inline(always)]
-    fn sqrt(self) -> Self {
-        nalgebra::Complex::sqrt(self)
     }
 }
 

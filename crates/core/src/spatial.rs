@@ -74,6 +74,13 @@ impl<T: Real> Vec3<T> {
         self * (T::one() / self.norm())
     }
 
+    /// The vector times a constant.
+    #[must_use]
+    #[inline(always)]
+    pub fn scale(self, k: f64) -> Self {
+        Vec3::new(self.x.scale(k), self.y.scale(k), self.z.scale(k))
+    }
+
     #[inline(always)]
     pub fn map<U>(self, f: impl Fn(T) -> U) -> Vec3<U> {
         Vec3 { x: f(self.x), y: f(self.y), z: f(self.z) }
@@ -170,7 +177,8 @@ impl<T: Real> Mat3<T> {
 
     #[inline(always)]
     pub fn lift(m: Mat3<f64>) -> Self {
-        Mat3(m.0.map(Vec3::lift))
+        let [x, y, z] = m.0;
+        Mat3([Vec3::lift(x), Vec3::lift(y), Vec3::lift(z)])
     }
 
     #[must_use]
@@ -228,8 +236,7 @@ impl<T: Real> Mat3<T> {
     #[inline(always)]
     pub fn of(self, a: Vec3<f64>) -> Vec3<T> {
         let [x, y, z] = self.0;
-        let term = |c: Vec3<T>, a: f64| c.map(|e| e.scale(a));
-        term(x, a.x) + term(y, a.y) + term(z, a.z)
+        x.scale(a.x) + y.scale(a.y) + z.scale(a.z)
     }
 
     /// The Cayley map `(1 - ŵ/2)⁻¹ (1 + ŵ/2)`, a rotation by 2 atan(|w|/2) about w \[T26\].

@@ -11,7 +11,7 @@ use polypod_core::jacobian;
 use polypod_core::leg;
 use polypod_core::mechanism::Mechanism;
 use polypod_core::quadratic;
-use polypod_core::real::{Dual, F, Real};
+use polypod_core::real::{Dual, F, Real, Scalar};
 use polypod_core::spatial::{Acceleration, Mat3, Motion, Pose, Twist, Vec3, Wrench};
 
 /// Relative, for second derivatives by two routes in double precision.
@@ -277,7 +277,7 @@ fn energy_rates(mech: &Mechanism, state: &Motion<f64>) -> (f64, f64) {
     (kinetic.d, potential.d)
 }
 
-fn forces<T: Real>(mech: &Mechanism, state: &Motion<f64>) -> [f64; 6] {
+fn forces<T: Scalar>(mech: &Mechanism, state: &Motion<f64>) -> [f64; 6] {
     let lift = Vec3::<T>::lift;
     let platform = Motion {
         pose: Pose::lift(&state.pose),

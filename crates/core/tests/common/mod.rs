@@ -196,7 +196,7 @@ fn make(spec: &str) -> Mechanism {
 pub fn states(mech: &Mechanism, count: usize, seed: u64) -> Vec<Motion<f64>> {
     let mut draw = Draw::new(seed);
     let mut result = Vec::new();
-    'next: for _ in 0..200 {
+    'next: for _ in 0..count.max(100) * 2 {
         if result.len() == count {
             break;
         }

@@ -1,0 +1,330 @@
+//! Several numbers side by side, one in each lane of a vector register.
+//!
+//! Every operation is that of the double, lane by lane and without fusing, so that results are the same bits whatever
+//! the width. [`dispatch`] picks the widest registers that the processor has when the program runs.
+
+use crate::real::Ordered;
+
+/// A register of numbers.
+pub trait Lanes: Ordered {
+    const WIDTH: usize;
+
+    /// The first [`Lanes::WIDTH`] numbers.
+    fn load(from: &[f64]) -> Self;
+
+    fn store(self, to: &mut [f64]);
+}
+
+/// The register of a processor without vectors.
+impl Lanes for f64 {
+    const WIDTH: usize = 1;
+    #[inline(always)]
+    fn load(from: &[f64]) -> Self {
+        from[0]
+    }
+    #[inline(always)]
+    fn store(self, to: &mut [f64]) {
+        to[0] = self;
+    }
+}
+
+/// What is to be done with registers of any width.
+pub trait Task {
+    /// Must be `#[inline(always)]` with all that it calls, so that it is compiled for each instruction set.
+    fn run<V: Lanes>(self);
+}
+
+/// Runs a task on the widest registers there are.
+#[inline]
+pub fn dispatch(task: impl Task) {
+    #[cfg(target_arch = "x86_64")]
+    x86::dispatch(task);
+    #[cfg(target_arch = "aarch64")]
+    task.run::<arm::F64x2>();
+    #[cfg(not(any(target_arch = "x86_64", target_arch = "aarch64")))]
+    task.run::<f64>();
+}
+
+/// The operations of a register by the instructions that make them.
+macro_rules! register {
+    (
+        $(#[$doc:meta])* $name:ident($vector:ty), $width:literal, $mask:ty;
+        $add:ident $sub:ident $mul:ident $div:ident $sqrt:ident $splat:ident $load:ident $store:ident;
+        neg |$n:ident| $neg:expr;
+        abs |$p:ident| $abs:expr;
+        signum |$s:ident| $signum:expr;
+        greater |$a:ident, $b:ident| $greater:expr;
+        select |$choose:ident, $first:ident, $second:ident| $select:expr;
+    ) => {
+        $(#[$doc])*
+        #[derive(Clone, Copy, Debug)]
+        #[repr(transparent)]
+        pub struct $name($vector);
+
+        // SAFETY of all blocks below: a value of this type exists only where `dispatch` has found the instructions.
+        impl Add for $name {
+            type Output = Self;
+            #[inline(always)]
+            fn add(self, b: Self) -> Self {
+                unsafe { $name($add(self.0, b.0)) }
+            }
+        }
+        impl Sub for $name {
+            type Output = Self;
+            #[inline(always)]
+            fn sub(self, b: Self) -> Self {
+                unsafe { $name($sub(self.0, b.0)) }
+            }
+        }
+        impl Mul for $name {
+            type Output = Self;
+            #[inline(always)]
+            fn mul(self, b: Self) -> Self {
+                unsafe { $name($mul(self.0, b.0)) }
+            }
+        }
+        impl Div for $name {
+            type Output = Self;
+            #[inline(always)]
+            fn div(self, b: Self) -> Self {
+                unsafe { $name($div(self.0, b.0)) }
+            }
+        }
+        impl Neg for $name {
+            type Output = Self;
+            #[inline(always)]
+            fn neg(self) -> Self {
+                let $n = self.0;
+                unsafe { $name($neg) }
+            }
+        }
+        impl Real for $name {
+            type Value = Self;
+            #[inline(always)]
+            fn lit(x: f64) -> Self {
+                unsafe { $name($splat(x)) }
+            }
+            #[inline(always)]
+            fn value(self) -> Self {
+                self
+            }
+            #[inline(always)]
+            fn sqrt(self) -> Self {
+                unsafe { $name($sqrt(self.0)) }
+            }
+            #[inline(always)]
+            fn select(choose: $mask, a: Self, b: Self) -> Self {
+                let ($choose, $first, $second) = (choose, a.0, b.0);
+                unsafe { $name($select) }
+            }
+        }
+        impl Ordered for $name {
+            type Mask = $mask;
+            #[inline(always)]
+            fn greater(self, than: Self) -> $mask {
+                let ($a, $b) = (self.0, than.0);
+                unsafe { $greater }
+            }
+            #[inline(always)]
+            fn abs(self) -> Self {
+                let $p = self.0;
+                unsafe { $name($abs) }
+            }
+            #[inline(always)]
+            fn signum(self) -> Self {
+                let $s = self.0;
+                unsafe { $name($signum) }
+            }
+        }
+        impl Lanes for $name {
+            const WIDTH: usize = $width;
+            #[inline(always)]
+            fn load(from: &[f64]) -> Self {
+                assert!(from.len() >= $width);
+                unsafe { $name($load(from.as_ptr())) }
+            }
+            #[inline(always)]
+            fn store(self, to: &mut [f64]) {
+                assert!(to.len() >= $width);
+                unsafe { $store(to.as_mut_ptr(), self.0) }
+            }
+        }
+    };
+}
+#[cfg(target_arch = "x86_64")]
+mod x86 {
+    #[allow(clippy::wildcard_imports)] // instructions
+    use std::arch::x86_64::*;
+    use std::ops::{Add, Div, Mul, Neg, Sub};
+
+    use super::{Lanes, Task};
+    use crate::real::{Ordered, Real};
+
+    register! {
+        /// SSE2, which every x86-64 has.
+        F64x2(__m128d), 2, __m128d;
+        _mm_add_pd _mm_sub_pd _mm_mul_pd _mm_div_pd _mm_sqrt_pd _mm_set1_pd _mm_loadu_pd _mm_storeu_pd;
+        neg |a| _mm_xor_pd(a, _mm_set1_pd(-0.0));
+        abs |a| _mm_andnot_pd(_mm_set1_pd(-0.0), a);
+        signum |a| _mm_or_pd(_mm_and_pd(a, _mm_set1_pd(-0.0)), _mm_set1_pd(1.0));
+        greater |a, b| _mm_cmpgt_pd(a, b);
+        select |mask, a, b| _mm_or_pd(_mm_and_pd(mask, a), _mm_andnot_pd(mask, b));
+    }
+
+    register! {
+        /// AVX2.
+        F64x4(__m256d), 4, __m256d;
+        _mm256_add_pd _mm256_sub_pd _mm256_mul_pd _mm256_div_pd _mm256_sqrt_pd _mm256_set1_pd _mm256_loadu_pd _mm256_storeu_pd;
+        neg |a| _mm256_xor_pd(a, _mm256_set1_pd(-0.0));
+        abs |a| _mm256_andnot_pd(_mm256_set1_pd(-0.0), a);
+        signum |a| _mm256_or_pd(_mm256_and_pd(a, _mm256_set1_pd(-0.0)), _mm256_set1_pd(1.0));
+        greater |a, b| _mm256_cmp_pd::<_CMP_GT_OQ>(a, b);
+        select |mask, a, b| _mm256_blendv_pd(b, a, mask);
+    }
+
+    register! {
+        /// AVX-512.
+        F64x8(__m512d), 8, __mmask8;
+        _mm512_add_pd _mm512_sub_pd _mm512_mul_pd _mm512_div_pd _mm512_sqrt_pd _mm512_set1_pd _mm512_loadu_pd _mm512_storeu_pd;
+        neg |a| _mm512_xor_pd(a, _mm512_set1_pd(-0.0));
+        abs |a| _mm512_abs_pd(a);
+        signum |a| _mm512_or_pd(_mm512_and_pd(a, _mm512_set1_pd(-0.0)), _mm512_set1_pd(1.0));
+        greater |a, b| _mm512_cmp_pd_mask::<_CMP_GT_OQ>(a, b);
+        select |mask, a, b| _mm512_mask_blend_pd(mask, b, a);
+    }
+
+    #[inline]
+    pub fn dispatch(task: impl Task) {
+        if is_x86_feature_detected!("avx512f") && is_x86_feature_detected!("avx512dq") {
+            unsafe { avx512(task) }
+        } else if is_x86_feature_detected!("avx2") {
+            unsafe { avx2(task) }
+        } else {
+            task.run::<F64x2>();
+        }
+    }
+
+    #[cfg(test)]
+    pub mod tests {
+        use super::*;
+
+        pub fn on_each_width(task: impl Task + Copy) {
+            task.run::<F64x2>();
+            if is_x86_feature_detected!("avx2") {
+                unsafe { avx2(task) }
+            }
+        }
+    }
+
+    #[target_feature(enable = "avx512f,avx512dq")]
+    fn avx512(task: impl Task) {
+        task.run::<F64x8>();
+    }
+
+    #[target_feature(enable = "avx2")]
+    fn avx2(task: impl Task) {
+        task.run::<F64x4>();
+    }
+}
+
+#[cfg(target_arch = "aarch64")]
+mod arm {
+    #[allow(clippy::wildcard_imports)] // instructions
+    use std::arch::aarch64::*;
+    use std::ops::{Add, Div, Mul, Neg, Sub};
+
+    use super::Lanes;
+    use crate::real::{Ordered, Real};
+
+    register! {
+        /// NEON, which every aarch64 has.
+        F64x2(float64x2_t), 2, uint64x2_t;
+        vaddq_f64 vsubq_f64 vmulq_f64 vdivq_f64 vsqrtq_f64 vdupq_n_f64 vld1q_f64 vst1q_f64;
+        neg |a| vnegq_f64(a);
+        abs |a| vabsq_f64(a);
+        signum |a| vbslq_f64(vdupq_n_u64(1 << 63), a, vdupq_n_f64(1.0));
+        greater |a, b| vcgtq_f64(a, b);
+        select |mask, a, b| vbslq_f64(mask, a, b);
+    }
+}
+
+#[cfg(test)]
+pub mod tests {
+    use std::cell::RefCell;
+
+    use super::*;
+
+    /// Runs a task on one number at a time, and on registers of each width that this processor has.
+    pub fn on_each_width(task: impl Task + Copy) {
+        task.run::<f64>();
+        dispatch(task);
+        #[cfg(target_arch = "x86_64")]
+        x86::tests::on_each_width(task);
+    }
+
+    /// Every operation, on pairs of numbers.
+    #[derive(Clone, Copy)]
+    struct Operations<'a> {
+        pairs: &'a [[f64; 8]; 2],
+        results: &'a RefCell<Vec<[[f64; 8]; 13]>>,
+    }
+
+    impl Task for Operations<'_> {
+        #[inline(always)]
+        fn run<V: Lanes>(self) {
+            let mut results = [[0.0; 8]; 13];
+            for k in (0..8).step_by(V::WIDTH) {
+                let (a, b) = (V::load(&self.pairs[0][k..]), V::load(&self.pairs[1][k..]));
+                let chosen = V::select(a.greater(b), V::lit(2.5), b);
+                let (sum, more) = (a.mul_add(b, a), a.scale(0.1));
+                let numbers = [
+                    a + b,
+                    a - b,
+                    a * b,
+                    a / b,
+                    -a,
+                    a.abs(),
+                    a.sqrt(),
+                    a.signum(),
+                    chosen,
+                    a.least(b),
+                    a.most(b),
+                    sum,
+                    more,
+                ];
+                for (row, number) in results.iter_mut().zip(numbers) {
+                    number.store(&mut row[k..]);
+                }
+            }
+            self.results.borrow_mut().push(results);
+        }
+    }
+
+    #[test]
+    fn lanes_are_doubles_bit_by_bit() {
+        let (inf, nan) = (f64::INFINITY, f64::NAN);
+        let a = [1.5, -2.0, 0.0, -0.0, 1e300, inf, nan, 0.1];
+        let b = [0.3, -2.5, -0.0, 0.0, 1e300, -inf, 1.0, nan];
+        let results = RefCell::new(Vec::new());
+        on_each_width(Operations { pairs: &[a, b], results: &results });
+        let all = results.into_inner();
+        // Which NaN an invalid operation gives is left open, and with it the sign of a NaN.
+        let bits = |row: [f64; 8]| row.map(|x| if x.is_nan() { 0 } else { x.to_bits() });
+        let defined = |k: usize, x: u64| if k == 6 { 0 } else { x };
+        for results in &all {
+            for (i, (row, first)) in results.iter().zip(&all[0]).enumerate() {
+                for (k, (x, known)) in bits(*row).into_iter().zip(bits(*first)).enumerate() {
+                    assert_eq!(defined(k, x), defined(k, known), "operation {i}, lane {k}");
+                }
+            }
+        }
+        assert!(all.len() > 1);
+        let value = |operation: usize, lane: usize| all[0][operation][lane];
+        assert_eq!([value(3, 0), value(4, 0), value(7, 3)], [a[0] / b[0], -1.5, -1.0]);
+        assert_eq!([value(8, 0), value(8, 3), value(9, 0), value(10, 0)], [2.5, 0.0, 0.3, 1.5]);
+        assert!(
+            value(9, 7) == 0.1 && value(10, 7) == 0.1,
+            "a number that cannot be compared to another stays"
+        );
+    }
+}

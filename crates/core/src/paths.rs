@@ -1,0 +1,558 @@
+//! Paths of complex solutions as the squared leg lengths change, several side by side \[T29\].
+
+use crate::complex::Complex;
+use crate::forward::{FOLD_PIVOTS, System, system};
+use crate::lanes::{self, Lanes, Task};
+use crate::linear::{Solved, solve, solve_all};
+use crate::mechanism::Mechanism;
+use crate::real::{Ordered, Real};
+use crate::spatial::{Mat3, Pose, Vec3};
+
+pub type C = Complex<f64>;
+
+/// Coordinates, as pure numbers, of a pose beyond which a path is taken to go to infinity: no real pose is there.
+pub const INFINITE: f64 = 1e7;
+
+/// The same for a path that cannot be followed further in double precision.
+const FAR: f64 = 300.0;
+
+/// The same below which a pose may be a real one.
+const NEARBY: f64 = 100.0;
+
+/// Share of a path that is tried first.
+const FIRST_STEP: f64 = 0.3;
+
+/// Share of a path below which a step is not made shorter.
+const SMALLEST_STEP: f64 = 1e-13;
+
+/// Share of a path that may be left where it ends in a singular pose.
+const NEAR_END: f64 = 1e-9;
+
+/// Newton steps at the end of a path.
+const LAST_STEPS: usize = 40;
+
+/// Size of a Newton step, as a pure number, from which the next one is rounding.
+const ROUNDING: f64 = 1e-14;
+
+/// The same by which it has converged quadratically.
+const CONVERGED: f64 = 1e-9;
+
+/// The same that no step on the way need fall below.
+const CLOSE: f64 = 1e-8;
+
+/// How a path ends.
+#[derive(Clone, Copy, Debug)]
+pub enum End {
+    Regular(Pose<C>),
+    /// At a solution where several paths end.
+    Singular(Pose<C>),
+    Infinite,
+    /// On the way: what it leads to is not known.
+    Lost,
+}
+
+impl End {
+    /// The pose, if it is a regular one.
+    #[must_use]
+    pub fn regular(self) -> Option<Pose<C>> {
+        match self {
+            End::Regular(pose) => Some(pose),
+            _ => None,
+        }
+    }
+}
+
+/// A straight path of the squared lengths from t = 0 to t = 1.
+#[derive(Clone, Copy, Debug)]
+pub struct Path<'a> {
+    pub mech: &'a Mechanism,
+    pub from: [C; 6],
+    pub to: [C; 6],
+    /// Error of a predicted step, as a pure number.
+    pub precision: f64,
+}
+
+/// Where one of several solutions on their way is.
+#[derive(Clone, Copy, Debug)]
+struct Traveller {
+    /// Which of them it is.
+    start: usize,
+    t: f64,
+    /// The next step.
+    h: f64,
+    /// Size of the Newton step that corrected the last prediction.
+    error: f64,
+    /// t and h of the step before.
+    before: (f64, f64),
+}
+
+impl Traveller {
+    fn new(start: usize) -> Self {
+        Traveller { start, t: 0.0, h: FIRST_STEP, error: 0.0, before: (0.0, 0.0) }
+    }
+
+    /// Whether a second Newton step is as much smaller than the first as it must be.
+    fn contracts(&self, size: f64, precision: f64) -> bool {
+        size <= (0.1 * precision * precision.max(self.error)).max(CLOSE)
+    }
+
+    /// Goes on if the error of a prediction permits it, and sets the next step: errors grow with its fifth power.
+    fn judge(&mut self, error: f64, precision: f64) -> bool {
+        let good = error <= precision;
+        let factor = 0.8 * (precision / error).powf(0.2);
+        let factor = if factor.is_nan() { 0.25 } else { factor.clamp(0.25, 4.0) };
+        if good {
+            *self = Traveller {
+                t: self.t + self.h,
+                h: self.h * factor,
+                error,
+                before: (self.t, self.h),
+                ..*self
+            };
+        } else {
+            self.h *= factor.min(0.5);
+        }
+        good
+    }
+
+    /// Whether it has been at the end for a step already.
+    fn waits(&self) -> bool {
+        self.t >= 1.0 && self.h == 0.0
+    }
+
+    /// Takes the last step back.
+    fn back(&mut self) {
+        let (t, h) = self.before;
+        *self = Traveller { t, h: 0.25 * h, error: 0.0, before: (t, 0.25 * h), ..*self };
+    }
+}
+
+impl Path<'_> {
+    /// Follows the path from solutions at t = 0 by the classical Runge-Kutta method and Newton corrections.
+    #[must_use]
+    pub fn follow(&self, starts: &[Pose<C>]) -> Vec<End> {
+        let mut ends = vec![End::Lost; starts.len()];
+        let mut waiting = starts.iter().enumerate();
+        let mut travellers: [Option<Traveller>; WIDTH] = [None; WIDTH];
+        let (mut place, mut rate) = (ZERO, ZERO);
+        let mut before = (place, rate);
+        let mut at = Evaluated::default();
+        loop {
+            for (k, traveller) in
+                travellers.iter_mut().enumerate().filter(|(_, traveller)| traveller.is_none())
+            {
+                if let Some((start, pose)) = waiting.next() {
+                    *traveller = Some(Traveller::new(start));
+                    Place::of(pose).put(&mut place, k);
+                }
+            }
+            if travellers.iter().all(Option::is_none) {
+                return ends;
+            }
+            // The second correction of the step before, and the rate for the next.
+            self.evaluate(&place, &row(&travellers, |who| who.t), &mut at);
+            rate.clone_from(&at.rate);
+            for (k, traveller) in travellers.iter_mut().enumerate() {
+                let Some(who) = traveller else { continue };
+                let arrived = who.t >= 1.0 && at.size[k] <= CONVERGED && at.pivots[k] > FOLD_PIVOTS;
+                if !arrived && who.waits() {
+                    (ends[who.start], *traveller) = (self.end(who, &Place::get(&place, k)), None);
+                    continue;
+                }
+                if who.contracts(at.size[k], self.precision) {
+                    add(&mut place, &at.correction, k);
+                } else {
+                    who.back();
+                    copy(&before.0, &mut place, k);
+                    copy(&before.1, &mut rate, k);
+                }
+                who.h = who.h.min(1.0 - who.t);
+                if arrived {
+                    (ends[who.start], *traveller) = (End::Regular(Place::get(&place, k).pose()), None);
+                }
+            }
+            before.0.clone_from(&place);
+            before.1.clone_from(&rate);
+            let (t, h) = (row(&travellers, |who| who.t), row(&travellers, |who| who.h));
+            let mut next = self.predict(&place, &rate, &t, &h, &mut at);
+            self.evaluate(&next, &later(&t, &h, 1.0), &mut at);
+            add_all(&mut next, &at.correction, &ONE);
+            for (k, traveller) in travellers.iter_mut().enumerate() {
+                let Some(who) = traveller else { continue };
+                if who.judge(at.size[k], self.precision) {
+                    copy(&next, &mut place, k);
+                }
+                let here = Place::get(&place, k);
+                if !(here.size(self.mech) < INFINITE) {
+                    (ends[who.start], *traveller) = (End::Infinite, None);
+                } else if who.t < 1.0 && who.h <= SMALLEST_STEP {
+                    (ends[who.start], *traveller) = (self.end(who, &here), None);
+                }
+            }
+        }
+    }
+
+    /// The classical Runge-Kutta step.
+    fn predict(&self, place: &Block, rate: &Block, t: &Row, h: &Row, at: &mut Evaluated) -> Block {
+        let middle = later(t, h, 0.5);
+        let [half, sixth, third] = [2.0, 6.0, 3.0].map(|n| h.map(|h| h / n));
+        let (mut sum, mut stage) = (*place, *place);
+        add_all(&mut sum, rate, &sixth);
+        add_all(&mut stage, rate, &half);
+        for (share, next) in [(&third, &half), (&third, h)] {
+            self.evaluate(&stage, &middle, at);
+            add_all(&mut sum, &at.rate, share);
+            stage = *place;
+            add_all(&mut stage, &at.rate, next);
+        }
+        self.evaluate(&stage, &later(t, h, 1.0), at);
+        add_all(&mut sum, &at.rate, &sixth);
+        sum
+    }
+
+    /// What the path comes to where it cannot be followed further, or paths seem to meet.
+    fn end(&self, who: &Traveller, place: &Place<C>) -> End {
+        let size = place.size(self.mech);
+        if who.t < 1.0 - NEAR_END {
+            return if size > FAR { End::Infinite } else { End::Lost };
+        }
+        let (mut place, mut last) = (*place, f64::NAN);
+        for _ in 0..LAST_STEPS {
+            let System { residual, matrix } = system(self.mech, &place.pose(), &self.to);
+            let step = solve(matrix, residual.map(|f| -f)).x;
+            place = place + place.along(self.mech, &step);
+            last = step_size(self.mech, &place, &step);
+            if !(last > ROUNDING) {
+                break;
+            }
+        }
+        // Where paths meet, Newton steps may be small by chance: the matrix tells.
+        let pose = place.pose();
+        let System { residual, matrix } = system(self.mech, &pose, &self.to);
+        let determined = size > NEARBY || solve(matrix, residual).pivots > FOLD_PIVOTS;
+        let regular = who.t >= 1.0 && last <= CONVERGED && determined;
+        if regular { End::Regular(pose) } else { End::Singular(pose) }
+    }
+
+    /// Newton steps and rates at places.
+    fn evaluate(&self, place: &Block, t: &Row, result: &mut Evaluated) {
+        lanes::dispatch(Evaluation { path: self, place, t, result });
+    }
+}
+
+/// A complex pose with its rotation as a quaternion of any size but zero, so that steps are sums \[T29\].
+#[derive(Clone, Copy, Debug)]
+struct Place<T> {
+    q: [T; 4],
+    o: Vec3<T>,
+}
+
+impl<T: Real> Place<T> {
+    #[inline(always)]
+    fn pose(&self) -> Pose<T> {
+        let [w, x, y, z] = self.q;
+        let share = T::lit(2.0) / (w * w + x * x + y * y + z * z);
+        let (sx, sy, sz) = (x * share, y * share, z * share);
+        let (wx, wy, wz) = (w * sx, w * sy, w * sz);
+        let (xx, xy, xz) = (x * sx, x * sy, x * sz);
+        let (yy, yz, zz) = (y * sy, y * sz, z * sz);
+        let one = T::one();
+        let rotation = Mat3::from_columns(
+            Vec3::new(one - (yy + zz), xy + wz, xz - wy),
+            Vec3::new(xy - wz, one - (xx + zz), yz + wx),
+            Vec3::new(xz + wy, yz - wx, one - (xx + yy)),
+        );
+        Pose { rotation, o: self.o }
+    }
+
+    /// The change of the place along (v/Λ, ω): `q' = ω q/2`.
+    #[inline(always)]
+    fn along(&self, mech: &Mechanism, x: &[T; 6]) -> Self {
+        let [w, i, j, k] = self.q;
+        let (omega, vector) = (Vec3::new(x[3], x[4], x[5]).scale(0.5), Vec3::new(i, j, k));
+        let turned = omega * w + omega.cross(vector);
+        let o = Vec3::new(x[0], x[1], x[2]).scale(mech.characteristic_length);
+        Place { q: [-omega.dot(vector), turned.x, turned.y, turned.z], o }
+    }
+}
+
+impl<T: Real> std::ops::Add for Place<T> {
+    type Output = Self;
+    fn add(self, b: Self) -> Self {
+        Place { q: std::array::from_fn(|i| self.q[i] + b.q[i]), o: self.o + b.o }
+    }
+}
+
+impl Place<C> {
+    /// From the largest of four products of the quaternion with each of its parts.
+    fn of(pose: &Pose<C>) -> Self {
+        let m = pose.rotation.rows();
+        let one = C::one();
+        let (w, x) = (one + m[0][0] + m[1][1] + m[2][2], one + m[0][0] - m[1][1] - m[2][2]);
+        let (y, z) = (one - m[0][0] + m[1][1] - m[2][2], one - m[0][0] - m[1][1] + m[2][2]);
+        let (wx, wy, wz) = (m[2][1] - m[1][2], m[0][2] - m[2][0], m[1][0] - m[0][1]);
+        let (xy, xz, yz) = (m[0][1] + m[1][0], m[0][2] + m[2][0], m[1][2] + m[2][1]);
+        let products = [[w, wx, wy, wz], [wx, x, xy, xz], [wy, xy, y, yz], [wz, xz, yz, z]];
+        let largest =
+            (0..4).fold(0, |a, b| if products[b][b].norm() > products[a][a].norm() { b } else { a });
+        let share = one / products[largest][largest].sqrt();
+        Place { q: products[largest].map(|p| p * share), o: pose.o }
+    }
+
+    /// How large its coordinates are, as a pure number: of o, and of the rotation, by |q|²/|q·q|.
+    fn size(&self, mech: &Mechanism) -> f64 {
+        let q = self.q.iter().fold(C::zero(), |sum, &e| sum + e * e).norm();
+        let turned = self.q.iter().map(|e| e.norm_sqr()).sum::<f64>() / q;
+        (modulus(self.o) / mech.characteristic_length).max(turned)
+    }
+
+    fn get(block: &Block, k: usize) -> Self {
+        let [w, x, y, z, a, b, c] = std::array::from_fn(|i| C::new(block[2 * i][k], block[2 * i + 1][k]));
+        Place { q: [w, x, y, z], o: Vec3::new(a, b, c) }
+    }
+
+    fn put(&self, block: &mut Block, k: usize) {
+        let numbers = self.q.into_iter().chain(self.o.array()).flat_map(|z| [z.re, z.im]);
+        for (row, number) in block.iter_mut().zip(numbers) {
+            row[k] = number;
+        }
+    }
+}
+
+/// The size of a step (v/Λ, ω), relative to how far off o is.
+#[inline(always)]
+fn step_size<T: Ordered>(mech: &Mechanism, place: &Place<Complex<T>>, x: &[Complex<T>; 6]) -> T {
+    let mut sum = T::zero();
+    for z in x {
+        sum = sum + z.norm_sqr();
+    }
+    let far = place.o.x.norm_sqr() + place.o.y.norm_sqr() + place.o.z.norm_sqr();
+    sum.sqrt() / (T::one() + far.sqrt().scale(1.0 / mech.characteristic_length))
+}
+
+/// The length of the real and imaginary parts together.
+#[must_use]
+pub fn modulus(v: Vec3<C>) -> f64 {
+    (v.x.norm_sqr() + v.y.norm_sqr() + v.z.norm_sqr()).sqrt()
+}
+
+/// Solutions that are followed side by side.
+const WIDTH: usize = 8;
+
+/// One number of each.
+type Row = [f64; WIDTH];
+
+/// Real and imaginary parts of the q and o of each: places, steps of them, or rates.
+type Block = [Row; 14];
+
+const ZERO: Block = [[0.0; WIDTH]; 14];
+const ONE: Row = [1.0; WIDTH];
+
+fn row(travellers: &[Option<Traveller>; WIDTH], part: impl Fn(&Traveller) -> f64) -> Row {
+    std::array::from_fn(|k| travellers[k].as_ref().map_or(0.0, &part))
+}
+
+fn later(t: &Row, h: &Row, share: f64) -> Row {
+    std::array::from_fn(|k| t[k] + share * h[k])
+}
+
+fn add_all(place: &mut Block, step: &Block, share: &Row) {
+    for (row, step) in place.iter_mut().zip(step) {
+        for k in 0..WIDTH {
+            row[k] += share[k] * step[k];
+        }
+    }
+}
+
+fn add(place: &mut Block, step: &Block, k: usize) {
+    for (row, step) in place.iter_mut().zip(step) {
+        row[k] += step[k];
+    }
+}
+
+fn copy(from: &Block, to: &mut Block, k: usize) {
+    for (to, from) in to.iter_mut().zip(from) {
+        to[k] = from[k];
+    }
+}
+
+/// Newton steps at places and their sizes, and the rates of the places along the path.
+#[derive(Clone, Copy, Debug, Default)]
+struct Evaluated {
+    correction: Block,
+    size: Row,
+    pivots: Row,
+    rate: Block,
+}
+
+struct Evaluation<'a> {
+    path: &'a Path<'a>,
+    place: &'a Block,
+    t: &'a Row,
+    result: &'a mut Evaluated,
+}
+
+impl Task for Evaluation<'_> {
+    #[inline(always)]
+    fn run<V: Lanes>(self) {
+        let Path { mech, from, to, .. } = self.path;
+        let half = 0.5 / (mech.characteristic_length * mech.characteristic_length);
+        let mut k = 0;
+        while k < WIDTH {
+            let place: Place<Complex<V>> = load(self.place, k);
+            let t = V::load(&self.t[k..]);
+            let mut squares = [Complex::<V>::zero(); 6];
+            let mut rates = [Complex::<V>::zero(); 6];
+            for i in 0..6 {
+                let change = to[i] - from[i];
+                squares[i] = Complex::new(
+                    V::lit(change.re).mul_add(t, V::lit(from[i].re)),
+                    V::lit(change.im).mul_add(t, V::lit(from[i].im)),
+                );
+                rates[i] = Complex::new(V::lit(change.re * half), V::lit(change.im * half));
+            }
+            let System { mut residual, matrix } = system(mech, &place.pose(), &squares);
+            for f in &mut residual {
+                *f = -*f;
+            }
+            let Solved { x: [step, rate], pivots, .. } = solve_all(matrix, [residual, rates]);
+            step_size(mech, &place, &step).store(&mut self.result.size[k..]);
+            pivots.store(&mut self.result.pivots[k..]);
+            store(&place.along(mech, &step), &mut self.result.correction, k);
+            store(&place.along(mech, &rate), &mut self.result.rate, k);
+            k += V::WIDTH;
+        }
+    }
+}
+
+#[inline(always)]
+fn load<V: Lanes>(block: &Block, k: usize) -> Place<Complex<V>> {
+    let mut parts = [Complex::<V>::zero(); 7];
+    for i in 0..7 {
+        parts[i] = Complex::new(V::load(&block[2 * i][k..]), V::load(&block[2 * i + 1][k..]));
+    }
+    let [w, x, y, z, a, b, c] = parts;
+    Place { q: [w, x, y, z], o: Vec3::new(a, b, c) }
+}
+
+#[inline(always)]
+fn store<V: Lanes>(place: &Place<Complex<V>>, block: &mut Block, k: usize) {
+    let ([w, x, y, z], [a, b, c]) = (place.q, place.o.array());
+    let parts = [w, x, y, z, a, b, c];
+    for i in 0..7 {
+        parts[i].re.store(&mut block[2 * i][k..]);
+        parts[i].im.store(&mut block[2 * i + 1][k..]);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::cell::RefCell;
+
+    use super::*;
+    use crate::common;
+    use crate::draw::Draw;
+    use crate::lanes::tests::on_each_width;
+
+    #[derive(Clone, Copy)]
+    struct Each<'a> {
+        path: &'a Path<'a>,
+        place: &'a Block,
+        t: &'a Row,
+        results: &'a RefCell<Vec<Evaluated>>,
+    }
+
+    impl Task for Each<'_> {
+        #[inline(always)]
+        fn run<V: Lanes>(self) {
+            let mut result = Evaluated::default();
+            Evaluation { path: self.path, place: self.place, t: self.t, result: &mut result }.run::<V>();
+            self.results.borrow_mut().push(result);
+        }
+    }
+
+    fn complex_places(draw: &mut Draw) -> [Place<C>; WIDTH] {
+        let mut place =
+            || Place { q: std::array::from_fn(|_| draw.complex()), o: draw.vector(Draw::complex) };
+        std::array::from_fn(|_| place())
+    }
+
+    #[test]
+    fn paths_side_by_side_are_those_alone_bit_by_bit() {
+        let mut draw = Draw(5);
+        for mech in common::mechanisms() {
+            let [from, to] = [(); 2].map(|()| std::array::from_fn(|_| draw.complex()));
+            let path = Path { mech: &mech, from, to, precision: 1e-3 };
+            let (places, mut block) = (complex_places(&mut draw), ZERO);
+            for (k, place) in places.iter().enumerate() {
+                place.put(&mut block, k);
+            }
+            let t: Row = std::array::from_fn(|_| draw.number());
+            let results = RefCell::new(Vec::new());
+            on_each_width(Each { path: &path, place: &block, t: &t, results: &results });
+            let all = results.into_inner();
+            for result in &all {
+                let bits = |e: &Evaluated| [e.correction, e.rate].map(|b| b.map(|row| row.map(f64::to_bits)));
+                assert_eq!(bits(result), bits(&all[0]));
+                assert_eq!((result.size, result.pivots), (all[0].size, all[0].pivots));
+            }
+            // Lane 3 is what the equations of that place alone say.
+            let squares = std::array::from_fn(|i| from[i] + (to[i] - from[i]).scale(t[3]));
+            let System { residual, matrix } = system(&mech, &places[3].pose(), &squares);
+            let step = solve(matrix, residual.map(|f| -f)).x;
+            let correction = places[3].along(&mech, &step);
+            let found = Place::get(&all[0].correction, 3);
+            let error = found.q.iter().zip(correction.q).map(|(&a, b)| (a - b).norm()).fold(0.0, f64::max);
+            assert!(
+                error < 1e-9 * correction.q.iter().map(|q| q.norm()).fold(1.0, f64::max),
+                "{}",
+                mech.name
+            );
+        }
+    }
+
+    #[test]
+    fn a_quaternion_of_any_size_is_its_rotation() {
+        for place in complex_places(&mut Draw(11)) {
+            let pose = place.pose();
+            let again = Place::of(&pose).pose();
+            for (a, b) in pose.rotation.0.into_iter().zip(again.rotation.0) {
+                assert!(modulus(a - b) < 1e-12 * (1.0 + modulus(a)));
+            }
+            let products = pose.rotation.transpose() * pose.rotation;
+            assert!(modulus(products.0[1] - Vec3::lift(Vec3::Y)) < 1e-11);
+        }
+        // Unit quaternion of a turn by 0.6 about z, twice as large.
+        let (s, c) = 0.3_f64.sin_cos();
+        let place = Place { q: [2.0 * c, 0.0, 0.0, 2.0 * s].map(C::lit), o: Vec3::zero() };
+        let turned = Mat3::from_rotation_vector(Vec3::Z * 0.6);
+        for (a, b) in place.pose().rotation.0.into_iter().zip(turned.0) {
+            assert!(modulus(a - Vec3::lift(b)) < 1e-15);
+        }
+    }
+
+    #[test]
+    fn the_rate_of_a_place_is_that_of_its_pose() {
+        let mech = common::published();
+        let mut draw = Draw(3);
+        let [place, ..] = complex_places(&mut draw);
+        let twist: [C; 6] = std::array::from_fn(|_| draw.complex());
+        let rate = place.along(&mech, &twist);
+        let h = 1e-6;
+        let moved = |h: f64| {
+            let step = Place { q: rate.q.map(|q| q.scale(h)), o: rate.o.scale(h) };
+            (place + step).pose()
+        };
+        let omega = Vec3::new(twist[3], twist[4], twist[5]);
+        let (after, before) = (moved(h), moved(-h));
+        for k in 0..3 {
+            let difference = (after.rotation.0[k] - before.rotation.0[k]).scale(0.5 / h);
+            let expected = omega.cross(place.pose().rotation.0[k]);
+            assert!(modulus(difference - expected) < 1e-6 * (1.0 + modulus(expected)));
+        }
+        let speed = (after.o - before.o).scale(0.5 / h);
+        assert!(
+            modulus(speed - Vec3::new(twist[0], twist[1], twist[2]).scale(mech.characteristic_length)) < 1e-8
+        );
+    }
+}
