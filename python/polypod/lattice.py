@@ -21,7 +21,7 @@ Progress = Callable[[int, int], None]
 DIVISIONS = 10
 """Steps of the shortest stroke by default."""
 
-MOST_NODES = 4 * 10**9
+MOST_NODES = 10**9
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,14 +111,12 @@ def length_lattice(
     )
     if lattice is None:
         raise WorkspaceError(
-            "start: its assembly mode has no pose inside the limits and bounds with the lengths of the nearest "
+            "start: its assembly mode has no pose inside limits and bounds with the lengths of the nearest "
             "node; give another, or a smaller step"
         )
-    done = 1
-    while new := lattice.wave():
-        done += new
+    while lattice.wave():
         if progress is not None:
-            progress(done, lattice.nodes)
+            progress(lattice.inside, lattice.nodes)
     found = lattice.reached()
     bottom, height = found["layers"]
     profile = found["profile"]
@@ -127,7 +125,7 @@ def length_lattice(
     return LengthLattice(
         step=step,
         nodes=lattice.nodes,
-        inside=found["inside"],
+        inside=lattice.inside,
         poses=found["poses"],
         at_limits=found["at_limits"],
         singular=found["singular"],

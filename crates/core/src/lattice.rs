@@ -290,7 +290,7 @@ impl Lattice {
         self.reached.inside += u64::from(*last == NONE);
         self.reached.poses += 1;
         self.known.push(Known { marker: marker(mech, &pose).array().map(|x| x as f32), next: *last });
-        *last = self.known.len() as u32 - 1;
+        *last = u32::try_from(self.known.len() - 1).expect("fewer poses than memory holds");
         self.front.push((node, pose));
         self.record(&pose);
     }

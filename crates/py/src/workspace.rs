@@ -152,11 +152,16 @@ impl PyLattice {
         self.lattice.len()
     }
 
+    /// Nodes with a pose that has been reached.
+    #[getter]
+    fn inside(&self) -> u64 {
+        self.lattice.reached.inside
+    }
+
     /// Counts, extents (3, 2), the profile (layers, 4) of least and greatest x and y, lower end and height of layers.
     fn reached<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let reached = &self.lattice.reached;
         let result = PyDict::new(py);
-        result.set_item("inside", reached.inside)?;
         result.set_item("poses", reached.poses)?;
         result.set_item("at_limits", reached.at_limits)?;
         result.set_item("singular", reached.singular)?;
