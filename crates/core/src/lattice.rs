@@ -225,7 +225,9 @@ impl Lattice {
                 match step {
                     Step::New(pose) => self.keep(mech, node, pose),
                     Step::Ends { passed, singular } => {
-                        passed.iter().for_each(|pose| self.record(pose));
+                        for pose in &passed {
+                            self.record(pose);
+                        }
                         self.reached.singular += u64::from(singular);
                         self.reached.at_limits += u64::from(!singular);
                     }
