@@ -51,7 +51,7 @@ def test_the_workspace_is_compared_with_the_print(demo):
     table = demo.text.split("## Workspace of Section 4")[1]
     assert "| printed | 1350.0 | 1371.0 | 511.0 |" in table
     assert "cut at the printed height" in table
-    assert "lattice of lengths, steps of 20 mm" in table
+    assert "lattice of lengths in steps of 20 mm" in table
 
 
 def test_results_load_back(demo):

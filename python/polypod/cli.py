@@ -569,7 +569,11 @@ def workspace(
             )
         with _bar("length lattice", 1) as progress:
             lattice = mech.length_lattice(
-                step=widths, sigma_min=sigma_min, threads=threads, progress=progress
+                step=widths,
+                bounds=dict(interval("--bounds", text) for text in bounds or []),
+                sigma_min=sigma_min,
+                threads=threads,
+                progress=progress,
             )
         _print_json(lattice.facts()) if as_json else _print_lattice(_console(), lattice.facts())
         return
@@ -623,11 +627,11 @@ def _check_workspace_options(
         for option, given in (
             ("--output", output),
             ("--draw", draw),
-            ("--bounds", bounds),
             ("--keep-aspect", keep_aspect),
         ):
             if given:
-                raise WorkspaceError(f"{option} is not for --kind lattice, which gives sizes only")
+                why = "is within one aspect anyway" if option == "--keep-aspect" else "gives sizes only"
+                raise WorkspaceError(f"{option} is not for --kind lattice, which {why}")
     for path in (output, draw):
         if path is not None and not path.parent.is_dir():
             raise WorkspaceError(f"{path.parent} is no directory; make it first")
@@ -672,7 +676,7 @@ def _print_lattice(out: Console, facts: dict[str, Any]) -> None:
     out.print(
         f"[bold]{escape(facts['mechanism'])}[/bold]: lattice of leg lengths, steps of "
         f"{readable(facts['step'], 'm')}, "
-        f"{facts['inside']} of {facts['nodes']} combinations inside all limits",
+        f"{facts['inside']} of {facts['nodes']} combinations inside all limits, {facts['poses']} poses",
         highlight=False,
     )
     table = _table("Extents of o", "", "least>", "greatest>", "width>")

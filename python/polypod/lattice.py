@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from polypod import _core
 from polypod.errors import UnsupportedError, WorkspaceError
 from polypod.mechanism import Mechanism
-from polypod.regions import check_threads, position_bounds, start_of
+from polypod.regions import bounds_of, check_threads, start_of
 from polypod.workspace import with_floor
 
 Array = NDArray[np.float64]
@@ -21,14 +21,14 @@ Progress = Callable[[int, int], None]
 DIVISIONS = 10
 """Steps of the shortest stroke by default."""
 
-MOST_NODES = 4 * 10**9
+MOST_NODES = 10**9
 
 
 @dataclass(frozen=True, eq=False)
 class LengthLattice:
-    """Positions of o for all combinations of leg lengths in one assembly mode [T41].
+    """Positions of o for all combinations of leg lengths in one aspect [T41].
 
-    Memory: one byte for each node.
+    Memory: 4 bytes for each node and 16 for each pose.
     """
 
     step: float
@@ -36,13 +36,15 @@ class LengthLattice:
     nodes: int
     """Of the lattice."""
     inside: int
-    """Nodes with a pose inside all limits."""
-    beyond_limits: int
-    """Nodes with a pose that passes a limit other than a stroke."""
-    ends: int
-    """Steps to a neighbour on the way to which the mode ends."""
+    """Nodes with a pose inside all limits that was reached."""
+    poses: int
+    """Such poses; a node may have several."""
+    at_limits: int
+    """Steps to a neighbour that end at a limit other than a stroke, or at the bounds."""
+    singular: int
+    """Steps to a neighbour that end in a singularity."""
     extents: Array
-    """(3, 2): least and greatest x, y, z of o, m."""
+    """(3, 2): least and greatest x, y, z of o, m: of these poses and where steps end on the way."""
     layers: Array
     """(k, 2): lower and upper end of each layer of z, m; only layers that hold a position."""
     profile: Array
@@ -64,8 +66,9 @@ class LengthLattice:
             **self.inputs,
             "nodes": self.nodes,
             "inside": self.inside,
-            "beyond_limits": self.beyond_limits,
-            "ends": self.ends,
+            "poses": self.poses,
+            "at_limits": self.at_limits,
+            "singular": self.singular,
             "extents": dict(zip("xyz", self.extents.tolist(), strict=True)),
         }
 
@@ -75,6 +78,7 @@ def length_lattice(
     *,
     step: float | None = None,
     layer: float | None = None,
+    bounds: Mapping[str, Sequence[float]] | None = None,
     start: ArrayLike | None = None,
     sigma_min: float | None = None,
     threads: int = 0,
@@ -100,17 +104,19 @@ def length_lattice(
     nodes = float(np.prod(np.rint(widths / step) + 1.0))
     if nodes > MOST_NODES:
         raise WorkspaceError(f"step makes a lattice of {nodes:.3g} nodes; at most {MOST_NODES:.0e}: widen it")
-    pose = start_of(mech, start, position_bounds(mech), regular=True)
-    lattice = _core.Lattice.begin(mech._core, np.ascontiguousarray(pose).reshape(-1), step, layer, threads)
+    box = np.array(list(bounds_of(mech, ("x", "y", "z"), bounds).values()))
+    pose = start_of(mech, start, box, regular=True)
+    lattice = _core.Lattice.begin(
+        mech._core, np.ascontiguousarray(pose).reshape(-1), box.tolist(), step, layer, threads
+    )
     if lattice is None:
         raise WorkspaceError(
-            "start: its assembly mode has no pose with the lengths of the nearest node; give another"
+            "start: its assembly mode has no pose inside limits and bounds with the lengths of the nearest "
+            "node; give another, or a smaller step"
         )
-    done = 1
-    while new := lattice.wave():
-        done += new
+    while lattice.wave():
         if progress is not None:
-            progress(done, lattice.nodes)
+            progress(lattice.inside, lattice.nodes)
     found = lattice.reached()
     bottom, height = found["layers"]
     profile = found["profile"]
@@ -119,9 +125,10 @@ def length_lattice(
     return LengthLattice(
         step=step,
         nodes=lattice.nodes,
-        inside=found["inside"],
-        beyond_limits=found["outside"],
-        ends=found["ends"],
+        inside=lattice.inside,
+        poses=found["poses"],
+        at_limits=found["at_limits"],
+        singular=found["singular"],
         extents=found["extents"],
         layers=np.stack([lower, lower + height], axis=1),
         profile=profile[some],
@@ -129,6 +136,7 @@ def length_lattice(
             "mechanism": mech.name,
             "step": step,
             "layer": layer,
+            "bounds": dict(zip("xyz", box.tolist(), strict=True)),
             "start": pose.tolist(),
             "sigma_min": sigma_min,
         },

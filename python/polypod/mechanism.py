@@ -667,23 +667,27 @@ class Mechanism:
         *,
         step: float | None = None,
         layer: float | None = None,
+        bounds: Mapping[str, Sequence[float]] | None = None,
         start: ArrayLike | None = None,
         sigma_min: float | None = None,
         threads: int = 0,
         progress: Callable[[int, int], None] | None = None,
     ) -> LengthLattice:
-        """Positions of o for all combinations of leg lengths in one assembly mode [T41].
+        """Positions of o for all combinations of leg lengths in one aspect [T41].
 
         The way of the paper's Section 4: every actuated leg takes lengths from the least to the greatest of
-        its stroke, and forward kinematics continues from each combination to the next.
+        its stroke, and forward kinematics continues from each combination to the next, as far as limits,
+        bounds and singularities let it. An aspect may hold several poses with the same lengths: all count.
 
         Args:
             step: of the lengths, m; a tenth of the shortest stroke by default.
             layer: height of the layers of z for which widths are kept, m; `step` by default.
-            start: pose (4, 4) whose mode is meant; by default a well conditioned one found from home.
+            bounds: of o, least and greatest of x, y, z, m; what the legs reach by default, on the side of the
+                base where home is.
+            start: pose (4, 4) whose aspect is meant; by default a well conditioned one found from home.
             sigma_min: a floor for the smallest singular value.
             threads: 0 for all cores. The result does not depend on it.
-            progress: called with the number of nodes done and of all.
+            progress: called with the number of nodes reached and of all.
 
         Raises:
             UnsupportedError: an actuated leg without a stroke, or not as many of them as freedoms.
@@ -695,6 +699,7 @@ class Mechanism:
             self,
             step=step,
             layer=layer,
+            bounds=bounds,
             start=start,
             sigma_min=sigma_min,
             threads=threads,

@@ -126,21 +126,22 @@ pub struct PyLattice {
 
 #[pymethods]
 impl PyLattice {
-    /// None where an actuated leg has no stroke, or no pose in the start's mode has the lengths next to the start's.
+    /// None where an actuated leg has no stroke, or no pose inside in the start's mode has the lengths next to it.
     #[staticmethod]
     fn begin(
         mech: Py<PyMechanism>,
         start: Array<'_>,
+        bounds: [[f64; 2]; 3],
         step: f64,
         layer: f64,
         threads: usize,
     ) -> PyResult<Option<Self>> {
-        let lattice = Lattice::new(mech.get().core(), &start_pose(&start)?, step, layer);
+        let lattice = Lattice::new(mech.get().core(), &start_pose(&start)?, bounds, step, layer);
         let pool = pool(threads)?;
         Ok(lattice.map(|lattice| PyLattice { mech, lattice, pool }))
     }
 
-    /// The number of nodes that the next wave reaches.
+    /// The number of poses that the next wave reaches.
     fn wave(&mut self, py: Python<'_>) -> usize {
         let (mech, pool, lattice) = (self.mech.get().core(), &self.pool, &mut self.lattice);
         py.detach(|| pool.install(|| lattice.wave(mech)))
@@ -151,13 +152,19 @@ impl PyLattice {
         self.lattice.len()
     }
 
+    /// Nodes with a pose that has been reached.
+    #[getter]
+    fn inside(&self) -> u64 {
+        self.lattice.reached.inside
+    }
+
     /// Counts, extents (3, 2), the profile (layers, 4) of least and greatest x and y, lower end and height of layers.
     fn reached<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let reached = &self.lattice.reached;
         let result = PyDict::new(py);
-        result.set_item("inside", reached.inside)?;
-        result.set_item("outside", reached.outside)?;
-        result.set_item("ends", reached.ends)?;
+        result.set_item("poses", reached.poses)?;
+        result.set_item("at_limits", reached.at_limits)?;
+        result.set_item("singular", reached.singular)?;
         let extents = reached.extents.as_flattened().to_vec();
         result.set_item("extents", PyArray1::from_vec(py, extents).reshape([3, 2])?)?;
         let profile = reached.profile.as_flattened().to_vec();
