@@ -15,17 +15,17 @@ use crate::status::Status;
 const NEWTON_STEPS: u32 = 200;
 
 /// Step, relative to the characteristic length, from which the next one is rounding: Newton's method is quadratic.
-const SMALL_STEP: f64 = 1e-9;
+pub(crate) const SMALL_STEP: f64 = 1e-9;
 
 /// Residual, as a pure number, that is rounding of zero.
-const ROUNDING: f64 = 2e-14;
+pub(crate) const ROUNDING: f64 = 2e-14;
 
 /// How much each Newton step must be smaller than the one before. A quarter is what the theorem of Newton and
 /// Kantorovich asks for: the solution is then the only one around, and the one that belongs to the guess.
-const CONTRACTION: f64 = 0.25;
+pub(crate) const CONTRACTION: f64 = 0.25;
 
 /// Newton steps for one piece of the path: with that contraction no more are needed from half a radian to rounding.
-const PIECE_STEPS: u32 = 12;
+pub(crate) const PIECE_STEPS: u32 = 12;
 
 /// Shortest piece of the path: where shorter ones would be needed, its assembly mode ends.
 const SHORTEST_PIECE: f64 = 1e-6;
@@ -34,7 +34,7 @@ const SHORTEST_PIECE: f64 = 1e-6;
 const MOST_ROUNDING: f64 = 2e-12;
 
 /// Longest Newton step: half a radian, or half a characteristic length.
-const LONGEST_STEP: f64 = 0.5;
+pub(crate) const LONGEST_STEP: f64 = 0.5;
 
 /// Share of a Newton step below which there is no way nearer to a solution.
 const SMALLEST_SHARE: f64 = 1e-7;

@@ -12,6 +12,7 @@ pub mod coordinates;
 mod draw;
 pub mod dynamics;
 pub mod forward;
+pub mod forward_lanes;
 pub mod jacobian;
 pub mod joints;
 pub mod lanes;

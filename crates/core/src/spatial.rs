@@ -245,11 +245,12 @@ impl<T: Real> Mat3<T> {
     pub fn cayley(w: Vec3<T>) -> Self {
         let half = w * T::lit(0.5);
         let share = T::lit(2.0) / (T::one() + half.dot(half));
-        Mat3([Vec3::X, Vec3::Y, Vec3::Z].map(|e: Vec3<f64>| {
-            let e = Vec3::lift(e);
-            let across = half.cross(e);
-            e + (across + half.cross(across)) * share
-        }))
+        let mut columns = Mat3::identity().0;
+        for e in &mut columns {
+            let across = half.cross(*e);
+            *e = *e + (across + half.cross(across)) * share;
+        }
+        Mat3(columns)
     }
 
     /// The matrix with the rounding of many products taken off: one Newton step of `MᵀM = 1` \[T29\].
@@ -316,7 +317,8 @@ impl<T: Real> Mul for Mat3<T> {
     type Output = Self;
     #[inline(always)]
     fn mul(self, b: Self) -> Self {
-        Mat3(b.0.map(|column| self * column))
+        let [x, y, z] = b.0;
+        Mat3([self * x, self * y, self * z])
     }
 }
 

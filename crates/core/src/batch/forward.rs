@@ -1,8 +1,9 @@
 //! Forward kinematics of many states.
 
-use super::Table;
 use super::checks::{actuated_values, check_legs, is_rotation, joint_limits, raw_pose, then};
-use crate::forward::{Found, forward_kinematics as find, passed};
+use super::{FieldId, Table};
+use crate::forward::{self, Found};
+use crate::forward_lanes::{WIDTH, forward_kinematics_of};
 use crate::limits;
 use crate::mechanism::Mechanism;
 use crate::modes::{self, Start};
@@ -20,42 +21,70 @@ pub fn forward_kinematics(
     continued: bool,
 ) -> Table {
     let n = lengths.len() / mech.legs.len();
-    let (mut table, [poses, residuals, iterations]) =
-        Table::new(n, [("pose", vec![4, 4]), ("residual", vec![]), ("iterations", vec![])]);
+    let guess = |i: usize| match guesses {
+        None => Some(mech.home),
+        Some(guesses) => {
+            let k = if guesses.len() == 16 { 0 } else { i };
+            is_rotation(guesses, k).then(|| raw_pose(guesses, k))
+        }
+    };
+    let mut solutions = Solutions::new(n);
+    if !continued {
+        let states: Vec<(usize, Pose<f64>)> = (0..n).filter_map(|i| Some((i, guess(i)?))).collect();
+        for states in states.chunks(WIDTH) {
+            let asked: Vec<(Vec<f64>, Pose<f64>)> =
+                states.iter().map(|&(i, guess)| (actuated_values(mech, lengths, i), guess)).collect();
+            for (&(i, _), found) in states.iter().zip(forward_kinematics_of(mech, &asked)) {
+                solutions.set(mech, i, &found);
+            }
+        }
+        return solutions.table;
+    }
     // The last pose that was solved, and the one of the state before it.
     let (mut last, mut before, mut solved) = (None, None, false);
     for i in 0..n {
-        let guess = match (last, guesses) {
-            (Some(pose), _) if continued => pose,
-            (_, None) => mech.home,
-            (_, Some(guesses)) => {
-                let k = if guesses.len() == 16 { 0 } else { i };
-                if !is_rotation(guesses, k) {
-                    table.status[i] = Status::InvalidInput;
-                    continue;
-                }
-                raw_pose(guesses, k)
-            }
-        };
+        let Some(guess) = last.or_else(|| guess(i)) else { continue };
         let values = actuated_values(mech, lengths, i);
-        let mut found = find(mech, &values, &guess);
-        if let (true, Some(last), Some(before), Status::Ok) = (continued, last, before, found.status) {
-            found = passed(mech, &values, &before, &last, &found).unwrap_or(found);
+        let mut found = forward::forward_kinematics(mech, &values, &guess);
+        if let (Some(last), Some(before), Status::Ok) = (last, before, found.status) {
+            found = forward::passed(mech, &values, &before, &last, &found).unwrap_or(found);
         }
-        let Found { pose, residual, iterations: steps, status, .. } = found;
-        let status = then(status, || check_found(mech, &pose, residual));
+        let status = solutions.set(mech, i, &found);
+        let unsolved = [Status::NotConverged, Status::InvalidInput, Status::Singular, Status::ModeJump]
+            .contains(&status);
+        (last, before) = if unsolved { (last, None) } else { (Some(found.pose), last.filter(|_| solved)) };
+        solved = !unsolved;
+    }
+    solutions.table
+}
+
+/// The table of poses found; a state that is not set has an invalid guess.
+struct Solutions {
+    table: Table,
+    fields: [FieldId; 3],
+}
+
+impl Solutions {
+    fn new(n: usize) -> Self {
+        let names = [("pose", vec![4, 4]), ("residual", vec![]), ("iterations", vec![])];
+        let (mut table, fields) = Table::new(n, names);
+        table.status.fill(Status::InvalidInput);
+        Solutions { table, fields }
+    }
+
+    /// The status of what was found, which is written down.
+    fn set(&mut self, mech: &Mechanism, i: usize, found: &Found) -> Status {
+        let Found { pose, residual, iterations, .. } = *found;
+        let status = then(found.status, || check_found(mech, &pose, residual));
+        let ([poses, residuals, counts], table) = (self.fields, &mut self.table);
         table.status[i] = status;
         if !matches!(status, Status::NotConverged | Status::InvalidInput) {
             table.set(poses, i, 0, &pose.matrix());
             table.set(residuals, i, 0, &[residual]);
         }
-        table.set(iterations, i, 0, &[f64::from(steps)]);
-        let unsolved = [Status::NotConverged, Status::InvalidInput, Status::Singular, Status::ModeJump]
-            .contains(&status);
-        (last, before) = if unsolved { (last, None) } else { (Some(pose), last.filter(|_| solved)) };
-        solved = !unsolved;
+        table.set(counts, i, 0, &[f64::from(iterations)]);
+        status
     }
-    table
 }
 
 /// Whether a pose that was found is one that the mechanism can be in, and within its limits. A root that a constraint
