@@ -66,11 +66,13 @@ def measure(name):
     whole = perf_counter() - start
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024  # kB on Linux
     for text, seconds in rows.items():
-        print(f"{text:48}{whole if seconds is None else seconds:10.3f} s{peak:10.0f} MB")
+        seconds = whole if seconds is None else seconds
+        time = f"{seconds:10.3f} s " if seconds >= 1.0 else f"{1e3 * seconds:10.3f} ms"
+        print(f"{text:48}{time}{peak:10.0f} MB")
 
 
 def main():
-    print(f"{'':48}{'time':>12}{'peak':>13}", flush=True)
+    print(f"{'':48}{'time':>13}{'peak':>13}", flush=True)
     for name in RUNS:
         subprocess.run([sys.executable, __file__, name], check=True)
 
