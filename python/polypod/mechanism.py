@@ -561,7 +561,8 @@ class Mechanism:
         Args:
             lengths: (..., n), m; those of passive legs are not read.
 
-        The first call for a mechanism finds all complex solutions for generic lengths: some tenths of a second.
+        The first call for a mechanism finds all complex solutions for generic lengths, which takes some
+        tenths of a second.
 
         Raises:
             UnsupportedError: not as many actuated legs as freedoms, or singular by design.
