@@ -24,7 +24,7 @@ from polypod.verify.pinocchio import Tree, Twin  # noqa: E402
 COLUMNS = 120
 DATA = Path(__file__).parent / "data"
 LU = "lu-3spu-2rpu-r"
-PUBLISHED = (LU, "stewart-gough-2002")
+PUBLISHED = (LU, "ups-hexapod")
 CATALOGUE = (*cases.DRAWN, *cases.FILES)
 SEED = 20240611
 NEAR_SINGULAR = (
@@ -256,7 +256,7 @@ def test_nothing_compared_is_no_agreement():
 
 
 def test_singular_poses_have_no_forces():
-    mech, (pose, *_) = draw_states("stewart-gough-2002", 1)
+    mech, (pose, *_) = draw_states("ups-hexapod", 1)
     pose[0] = np.eye(4)
     pose[0, 2, 3] = 2.0
     pose[0, :2, :2] = [[0.0, -1.0], [1.0, 0.0]]  # a quarter turn: all legs in one linear complex
