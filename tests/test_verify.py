@@ -88,12 +88,6 @@ def test_a_thousand_random_states(name):
     found = verify_states(mech, *states)
     assert found.comparisons[0].compared == 1000
     assert found.agrees
-    # Also relative to the greatest force of each single state, not of all.
-    twin = Twin(describe(mech))
-    mine = mech.inverse_dynamics(*states).forces
-    for forces, *state in zip(mine, *states, strict=True):
-        answer, _ = twin.answer(*state)
-        assert np.max(np.abs(forces - answer["forces"])) <= 1e-9 * np.max(np.abs(forces))
 
 
 @pytest.mark.parametrize("name", ["rod-lined", "rod-of-one", "passive", "rpr", "upf", "fpf", "3-rps"])
@@ -120,6 +114,26 @@ def agrees_on(name, every):
     assert expected <= rows(found).keys()
 
 
+RODS = (
+    ["rRPU", "UPS", "rRPS", "SPS", "UPS-"],
+    ["rRPS", "rRPS", "UPS", "SPS", "UPS", "SPU-"],
+    ["rRPU", "rRPU", "UPS", "SPS-"],
+    ["rRPR", "UPS", "SPS", "UPS"],
+)
+
+
+@pytest.mark.parametrize("kinds", RODS, ids="+".join)
+def test_legs_on_one_rod_in_planes_at_an_angle(kinds):
+    rng = np.random.default_rng(0)
+    tables = cases.draw("rod", kinds, rng)
+    spec = cases.o.read(tables)
+    pose = cases.sample(spec, rng)
+    q = rng.normal(size=(2, len(pose[1]), 6))
+    motion = cases.o.feasible_motion(spec, pose, q[0], q[1])
+    found = verify_states(pp.Mechanism.from_dict(tables), cases.matrix(pose), *motion)
+    assert found.agrees, exceeding(found)
+
+
 def test_the_example_motion():
     mech = pp.load(LU)
     motion = pp.load_motion(LU, mech).sample(np.linspace(0.0, 8.0, 9))
@@ -133,7 +147,7 @@ def test_the_example_motion():
     assert worst.time == motion.time[worst.index]
     assert worst.part in mech.leg_names
     assert 0.0 < worst.rms < worst.max < 1e-7
-    assert worst.relative_max == worst.max / worst.reference
+    assert worst.max / worst.greatest <= worst.relative_max < 1e-12
 
 
 def test_rest_and_no_load_are_no_division_by_zero():

@@ -25,8 +25,8 @@ def as_markdown(facts: dict[str, Any]) -> str:
     parts = []
     for engine in facts["engines"]:
         rows = "\n".join(
-            f"| {row['title']} / {row['unit']} | {row['max']:.1e} | {row['rms']:.1e} "
-            f"| {_share(row['relative_max'])} | {_share(row['relative_rms'])} | {_worst(row['worst'])} |"
+            f"| {row['title']} / {row['unit']} | {_number(row['max'])} | {_number(row['rms'])} "
+            f"| {_number(row['relative_max'])} | {_number(row['relative_rms'])} | {_worst(row['worst'])} |"
             for row in engine["quantities"]
         )
         parts.append(
@@ -39,8 +39,8 @@ def as_markdown(facts: dict[str, Any]) -> str:
     return "\n\n".join([*parts, f"Relative errors are relative to {facts['relative_to']}."])
 
 
-def _share(value: float | None) -> str:
-    return "infinite" if value is None else f"{value:.1e}"
+def _number(value: float | None) -> str:
+    return "none" if value is None else f"{value:.1e}"
 
 
 def _worst(worst: dict[str, Any]) -> str:

@@ -55,8 +55,8 @@ QUANTITIES: dict[str, tuple[str, str, str]] = {
 }
 
 RELATIVE_TO = (
-    "the greatest value of the quantity at all states, or to the platform's own greatest motion where that "
-    "is greater; those of constraint forces and torques also to the greatest active force"
+    "the greatest value of the quantity among all parts at the same state, or where that is greater to the "
+    "platform's own motion there; constraint forces and torques also to the greatest active force"
 )
 
 
@@ -101,12 +101,13 @@ class Row:
     """Largest error; for vectors its length."""
     rms: float
     """Root mean square over states and parts."""
-    reference: float
-    """What relative errors are divided by, in `unit`."""
+    greatest: float
+    """Greatest value at all states, in `unit`."""
     relative_max: float
+    """Largest error as a part of what `RELATIVE_TO` says of its state."""
     relative_rms: float
     part: str
-    """The leg or rod with the largest error; empty for quantities of the whole."""
+    """The leg or rod with the largest relative error; empty for quantities of the whole."""
     index: int
     """The state with it."""
     time: float | None
@@ -169,9 +170,9 @@ class Verification:
                             "quantity": row.quantity,
                             "title": row.title,
                             "unit": row.unit,
-                            "max": row.max,
-                            "rms": row.rms,
-                            "reference": row.reference,
+                            "max": _finite(row.max),
+                            "rms": _finite(row.rms),
+                            "greatest": _finite(row.greatest),
                             "relative_max": _finite(row.relative_max),
                             "relative_rms": _finite(row.relative_rms),
                             "agrees": row.relative_max <= self.tolerance,
@@ -395,7 +396,7 @@ def _compare(
     rows: tuple[Row, ...] = ()
     if both:
         values = {q: np.array([found[q] for found in theirs]) for q in mine if q in theirs[0]}
-        scales = _scales(mech, states, mine["forces"][chosen], values, chosen)
+        scales = _scales(mech, states, values, chosen)
         rows = tuple(
             _row(mech, states, quantity, mine[quantity][chosen], values[quantity], scales, chosen)
             for quantity in QUANTITIES
@@ -421,23 +422,21 @@ def _finite(value: float) -> float | None:
 # --- errors -------------------------------------------------------------------------------------------------
 
 
-def _scales(
-    mech: Mechanism, states: States, forces: Array, theirs: Values, chosen: NDArray[np.int64]
-) -> dict[str, float]:
-    """What each kind of quantity is at least compared with: so that rounding of what is zero is no error."""
+def _scales(mech: Mechanism, states: States, theirs: Values, chosen: NDArray[np.int64]) -> dict[str, Array]:
+    """(N,): what each kind of quantity is at least compared with, so that rounding of zero is no error."""
     size = mech.characteristic_length
-
-    def peak(array: Array) -> float:
-        return float(np.max(np.linalg.norm(array, axis=-1), initial=0.0))
-
     twist, acceleration = states.twist[chosen], states.acceleration[chosen]
-    turning = peak(twist[:, 3:])
-    speed = peak(twist[:, :3]) + size * turning
-    gain = peak(acceleration[:, :3]) + size * (peak(acceleration[:, 3:]) + turning**2)
-    force = max(_peak("forces", array) for array in (forces, theirs.get("forces", forces)))
+    velocity, turning, gain, turning_gain = (
+        np.linalg.norm(array[:, part], axis=-1)
+        for array in (twist, acceleration)
+        for part in (slice(0, 3), slice(3, 6))
+    )
+    speed = velocity + size * turning
+    gain = gain + size * turning_gain + speed**2 / size
+    force = np.max(np.abs(theirs["forces"]), axis=-1)
     return {
-        "freedoms": 1.0,
-        "length": size,
+        "freedoms": np.ones(len(chosen)),
+        "length": np.full(len(chosen), size),
         "speed": speed,
         "acceleration": gain,
         "angular speed": speed / size,
@@ -456,41 +455,39 @@ def _sizes(quantity: str, values: Array) -> Array:
     return sizes.reshape(len(sizes), -1)
 
 
-def _peak(quantity: str, values: Array) -> float:
-    return float(np.max(_sizes(quantity, values), initial=0.0))
-
-
 def _row(
     mech: Mechanism,
     states: States,
     quantity: str,
     mine: Array,
     theirs: Array,
-    scales: Mapping[str, float],
+    scales: Mapping[str, Array],
     chosen: NDArray[np.int64],
 ) -> Row:
     title, unit, kind = QUANTITIES[quantity]
-    errors = _sizes(quantity, mine - theirs)
-    at, part = np.unravel_index(int(np.argmax(errors)), errors.shape)
-    reference = max(_peak(quantity, theirs), scales[kind])
-    largest, rms = float(errors.max()), float(np.sqrt(np.mean(errors**2)))
-
-    def relative(error: float) -> float:
-        return error / reference if reference > 0.0 else (0.0 if error == 0.0 else np.inf)
-
-    names = mech.rod_names if quantity.startswith("rod") else mech.leg_names
+    errors, values = _sizes(quantity, mine - theirs), _sizes(quantity, theirs)
+    reference = np.maximum(values.max(axis=-1), scales[kind])[:, None]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        relative = np.where(errors == 0.0, 0.0, errors / reference)
+    at, part = np.unravel_index(int(np.argmax(relative)), relative.shape)
+    names = {"rod": mech.rod_names}.get(quantity[:3], mech.leg_names)
+    whole = quantity == "freedoms" or quantity.startswith("constraint")
     i = int(chosen[at])
     return Row(
         quantity=quantity,
         title=title,
         unit=unit,
-        max=largest,
-        rms=rms,
-        reference=reference,
-        relative_max=relative(largest),
-        relative_rms=relative(rms),
-        part=names[int(part)] if errors.shape[1] == len(names) and quantity != "freedoms" else "",
+        max=float(errors.max()),
+        rms=_rms(errors),
+        greatest=float(values.max()),
+        relative_max=float(relative.max()),
+        relative_rms=_rms(relative),
+        part="" if whole else names[int(part)],
         index=i,
         time=None if states.time is None else float(states.time[i]),
         pose=states.pose[i],
     )
+
+
+def _rms(values: Array) -> float:
+    return float(np.sqrt(np.mean(values**2)))
