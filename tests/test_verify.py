@@ -11,9 +11,9 @@ import pytest
 
 import polypod as pp
 from polypod.verify import table, verify, verify_states
-from polypod.verify.placement import inverse
+from polypod.verify.placement import BASE, PLATFORM, inverse
 from polypod.verify.report import as_markdown
-from polypod.verify.tree import BASE, PLATFORM, depth_first, describe, joint_values, release
+from polypod.verify.tree import depth_first, describe, joint_values, release
 
 pin = pytest.importorskip("pinocchio")
 
@@ -267,6 +267,18 @@ def test_nothing_compared_is_no_agreement():
     assert found.comparisons[0].rows == ()
     json.dumps(found.facts(), allow_nan=False)
     assert "0 of 2 states compared" in as_markdown(found.facts())
+
+
+def test_legs_without_length_or_along_their_axis_have_no_answer():
+    tables = mechanism("stewart-gough").to_dict()
+    for end in ("base", "platform"):
+        tables["legs"][0][end]["point"] = [250, 0, 0]
+    tables["legs"][0]["base"]["axis"] = [1, 0, 0]
+    mech = pp.Mechanism.from_dict(tables)
+    pose = np.tile(np.eye(4), (2, 1, 1))
+    pose[1, 0, 3] = 0.5
+    found = verify_states(mech, pose, np.zeros((2, 6)), np.zeros((2, 6))).comparisons[0]
+    assert found.without_answer == {"Polypod: SINGULAR": 2, "Pinocchio: SINGULAR": 2}
 
 
 def test_singular_poses_have_no_forces():

@@ -14,8 +14,8 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from polypod.status import Status
-from polypod.verify.placement import Placements, cross, inverse
-from polypod.verify.tree import BASE, PLATFORM, Body, Freedom, Multibody, joint_values, release
+from polypod.verify.placement import BASE, PLATFORM, Placements, cross, inverse
+from polypod.verify.tree import Body, Freedom, Multibody, joint_values, release
 
 Array = NDArray[np.float64]
 
@@ -295,7 +295,10 @@ class Twin:
         tree = self.tree
         if not all(np.isfinite(a).all() for a in (pose, twist, acceleration, wrench)):
             return {}, Status.INVALID_INPUT
-        moved = tree.move(tree.start(tree.tree.start(pose)), pose, twist, acceleration)
+        start = tree.tree.start(pose)
+        if not all(np.isfinite(frame).all() for frame in start.values()):
+            return {}, Status.SINGULAR  # a leg without length, or along its own axis, has no frame
+        moved = tree.move(tree.start(start), pose, twist, acceleration)
         if moved.status is not Status.OK:
             return {"closure": moved.residual, "steps": moved.steps}, moved.status
         tree.set(moved)

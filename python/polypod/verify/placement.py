@@ -16,6 +16,9 @@ Array = NDArray[np.float64]
 Placements = dict[str, Array]
 """Frame (4, 4) of each body in base axes, by the body's name."""
 
+BASE, PLATFORM = "base", "platform"
+"""Names of these two bodies."""
+
 PARALLEL = 1e-6
 """rad: planes of legs on one rod that are as parallel as this at home are parallel [T9]."""
 
@@ -31,7 +34,17 @@ class Turning:
     """n is the axis itself (R, F), or square to it and to the leg (U)."""
 
 
-def leg_joint_axes(geometry: Mapping[str, Any], leg: Mapping[str, Any]) -> Turning | None:
+def leg_bodies(leg: Mapping[str, Any]) -> tuple[str, str]:
+    """Names of a leg's cylinder and piston."""
+    return f"leg {leg['name']} cylinder", f"leg {leg['name']} piston"
+
+
+def rod_body(rod: Mapping[str, Any]) -> str:
+    """Name of a rod's body."""
+    return f"rod {rod['name']}"
+
+
+def turning_of(geometry: Mapping[str, Any], leg: Mapping[str, Any]) -> Turning | None:
     """What keeps a leg from spinning: its base joint if that is U, R or F, else its platform joint."""
     if leg["base"]["rod"] is not None:
         return Turning("base", unit(geometry["rods"][leg["base"]["rod"]]["axis"]), along=False)
@@ -53,13 +66,13 @@ def placements(geometry: Mapping[str, Any], pose: Array, *, zero: bool = False) 
 
     With `zero` the legs on a rod have the planes that the rod holds them in: parallel where they nearly are.
     """
-    found: Placements = {"platform": np.array(pose)}
+    found: Placements = {PLATFORM: np.array(pose)}
     normals: dict[int, Array] = {}
     for leg in geometry["legs"]:
         start = np.array(leg["base"]["point"])
         end = pose[:3, :3] @ leg["platform"]["point"] + pose[:3, 3]
         delta = unit(end - start)
-        n = _normal(leg_joint_axes(geometry, leg), pose, delta)
+        n = _normal(turning_of(geometry, leg), pose, delta)
         rod = leg["base"]["rod"]
         if rod is not None:
             first = normals.setdefault(rod, n)
@@ -67,11 +80,12 @@ def placements(geometry: Mapping[str, Any], pose: Array, *, zero: bool = False) 
                 n = first
         delta = unit(delta - n * (n @ delta))
         axes = np.column_stack([n, delta, cross(n, delta)])
-        found[f"leg {leg['name']} cylinder"] = _frame(axes, start)
-        found[f"leg {leg['name']} piston"] = _frame(axes, start + delta * np.linalg.norm(end - start))
+        cylinder, piston = leg_bodies(leg)
+        found[cylinder] = _frame(axes, start)
+        found[piston] = _frame(axes, start + delta * np.linalg.norm(end - start))
     for k, rod in enumerate(geometry["rods"]):
         line, n = unit(rod["axis"]), normals[k]
-        found[f"rod {rod['name']}"] = _frame(np.column_stack([line, n, cross(line, n)]), rod["point"])
+        found[rod_body(rod)] = _frame(np.column_stack([line, n, cross(line, n)]), rod["point"])
     return found
 
 
@@ -94,9 +108,10 @@ def inverse(frame: Array) -> Array:
 
 
 def unit(vector: ArrayLike) -> Array:
-    """The direction of a vector (3,)."""
+    """The direction of a vector (3,); NaN for one of no length."""
     array = np.asarray(vector, dtype=np.float64)
-    return np.asarray(array / np.linalg.norm(array))
+    with np.errstate(invalid="ignore"):
+        return np.asarray(array / np.linalg.norm(array))
 
 
 def cross(a: Array, b: Array) -> Array:

@@ -16,20 +16,23 @@ from numpy.typing import NDArray
 
 from polypod.mechanism import Mechanism
 from polypod.verify.placement import (
+    BASE,
+    PLATFORM,
     Placements,
     across,
     cross,
     inverse,
-    leg_joint_axes,
+    leg_bodies,
     placements,
+    rod_body,
     turn_about,
     turned,
+    turning_of,
     unit,
 )
 
 Array = NDArray[np.float64]
 
-BASE, PLATFORM = "base", "platform"
 X, Y, Z = np.eye(3)
 """Axes of a leg's links, n, δ, n×δ; and of a rod's: L, n, L×n."""
 POINT = np.zeros(3)
@@ -150,7 +153,7 @@ def release(tree: Multibody) -> Multibody:
     for leg, parts in zip(tree.geometry["legs"], tree.legs, strict=True):
         ends = (POINT, np.array(leg["platform"]["point"]))
         closures.append(Closure(f"leg {parts.name} end", (parts.piston, PLATFORM), ends, ()))
-        turning = leg_joint_axes(tree.geometry, leg)
+        turning = turning_of(tree.geometry, leg)
         if turning is not None:
             # U: n is square to the axis; R and F: n is the axis, or n×δ is square to it.
             other = BASE if turning.side == "base" else PLATFORM
@@ -189,16 +192,6 @@ def joint_values(body: Body, zero: Array, now: Array) -> list[float | Array]:
                 values.append(angle)
                 rotation = turned(freedom.axis, -angle) @ rotation
     return values
-
-
-def leg_bodies(leg: Mapping[str, Any]) -> tuple[str, str]:
-    """Names of a leg's cylinder and piston."""
-    return f"leg {leg['name']} cylinder", f"leg {leg['name']} piston"
-
-
-def rod_body(rod: Mapping[str, Any]) -> str:
-    """Name of a rod's body."""
-    return f"rod {rod['name']}"
 
 
 def depth_first(bodies: Iterable[Body]) -> tuple[Body, ...]:
