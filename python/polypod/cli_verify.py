@@ -78,7 +78,7 @@ def _print_verification(out: Console, facts: dict[str, Any]) -> None:
     )
     for engine in facts["engines"]:
         title = f"Errors against {engine['engine']} {engine['version']}"
-        headers = ("max error>", "rms>", "relative>", "rms>", "worst at / s>", "part")
+        headers = ("max error>", "rms>", "relative>", "rms>", "at / s>", "part")
         table = _table(title, "", "unit", *headers, "")
         table.box, table.pad_edge, table.collapse_padding = None, False, True
         for row in engine["quantities"]:
