@@ -89,6 +89,22 @@ def test_summary_tells_measured_numbers(demo):
         assert name in demo.text
 
 
+def test_the_motion_is_compared_with_another_engine(demo):
+    pytest.importorskip("pinocchio")
+    table = demo.text.split("## Table III")[1]
+    assert "| active forces / N |" in table
+    assert "81 of 81 states compared; all errors within 1e-09." in table
+
+
+def test_without_the_engine_the_summary_says_what_to_install(monkeypatch):
+    from polypod import demo as module
+    from polypod.verify import table
+
+    monkeypatch.setattr(table, "find_spec", lambda module: None)
+    mech = pp.load(EXAMPLE)
+    assert "pip install polypod[verify]" in module._table_iii(mech, pp.load_motion(EXAMPLE, mech))
+
+
 def test_a_second_run_gives_the_same_files(demo, tmp_path):
     again = run_demo(tmp_path)
     for name in again.files:

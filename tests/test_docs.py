@@ -20,6 +20,7 @@ import sys
 import tomllib
 from collections.abc import Iterator
 from dataclasses import dataclass
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
@@ -35,7 +36,7 @@ EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
 PYTHON_SOURCES = sorted((ROOT / "python").rglob("*.py"))
 RUST_SOURCES = sorted((ROOT / "crates").rglob("*.rs"))
 DOCTEST_FLAGS = doctest.NORMALIZE_WHITESPACE | doctest.ELLIPSIS
-OPTIONAL = {"trimesh", "viser"}  # packages of the extras, which some modules need
+OPTIONAL = {"pinocchio", "trimesh", "viser"}  # packages of the extras, which some modules need
 LAST_EQUATION = 44
 
 
@@ -104,6 +105,8 @@ def run_doctest(test: doctest.DocTest) -> None:
 
 @pytest.mark.parametrize("page", pages_with("python"), ids=short)
 def test_python_blocks_run(page: Path, empty_folder: Path) -> None:
+    if page.stem == "verification" and find_spec("pinocchio") is None:
+        pytest.skip("needs pinocchio")
     names: dict[str, object] = {"__name__": "__main__"}
     for block in blocks(page):
         if block.title:
@@ -130,6 +133,8 @@ def test_docstring_examples_run(name: str) -> None:
         if error.name in OPTIONAL:
             pytest.skip(f"needs {error.name}")
         raise
+    if name.startswith("polypod.verify") and find_spec("pinocchio") is None:
+        pytest.skip("needs pinocchio")
     for test in doctest.DocTestFinder(exclude_empty=True).find(module):
         run_doctest(test)
 

@@ -748,3 +748,8 @@ def _bar(text: str, total: int) -> Iterator[Callable[[int, int], None]]:
             progress.update(task, completed=done, total=of)
 
         yield update
+
+
+# --- commands with files of their own -----------------------------------------------------------------------
+
+import polypod.cli_verify  # noqa: E402, F401 - adds its command to those above

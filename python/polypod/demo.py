@@ -12,16 +12,22 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from polypod import plots
+from polypod.errors import MissingEngineError
 from polypod.mechanism import Mechanism, load
-from polypod.motion import load_motion
+from polypod.motion import Motion, load_motion
 from polypod.paper import fit_markdown, fit_table_i, table_i
 from polypod.results import Solution
 from polypod.section4 import Section4, as_markdown, section4
 from polypod.solution import solve
 from polypod.summary import describe, summarise
+from polypod.verify import verify
+from polypod.verify.report import as_markdown as verification_markdown
 
 EXAMPLE = "lu-3spu-2rpu-r"
 """Built-in mechanism, and the motion of the same name."""
+
+COMPARED = 81
+"""States of the motion that are compared with another engine."""
 
 
 @dataclass(frozen=True)
@@ -47,7 +53,8 @@ def run_demo(directory: str | PathLike[str]) -> Demo:
     directory = Path(directory)
     directory.mkdir(parents=True, exist_ok=True)
     mech = load(EXAMPLE)
-    solution = solve(mech, load_motion(EXAMPLE, mech))
+    motion = load_motion(EXAMPLE, mech)
+    solution = solve(mech, motion)
     facts, path = describe(mech), summarise(mech, solution)
 
     files = []
@@ -72,6 +79,7 @@ def run_demo(directory: str | PathLike[str]) -> Demo:
         plots.save_figure(views, directory / f"fig3{suffix}")
         files.append(f"fig3{suffix}")
     text = _summary(facts, path, _table_i(mech)) + _workspace_summary(found)
+    text += _table_iii(mech, motion)
     (directory / "summary.md").write_text(text, encoding="utf-8")
     return Demo(directory, (*files, "summary.md"), facts, path, text)
 
@@ -183,6 +191,26 @@ def _workspace_summary(found: Section4) -> str:
 
 `fig3.png` shows the first, coloured by what ends it. Its volume is
 {flood["volume"]:.3f} m³, give or take {share:.1g} %. The paper steps the lengths by 10 mm; that takes longer.
+"""
+
+
+def _table_iii(mech: Mechanism, motion: Motion) -> str:
+    """The part of summary.md on Table III; every number is measured."""
+    start, end = motion.time[0], motion.time[-1]
+    try:
+        facts = verify(mech, motion.sample(np.linspace(start, end, COMPARED))).facts()
+    except MissingEngineError as error:
+        return f"""
+## Table III
+
+Not compared with another engine: {error}
+"""
+    return f"""
+## Table III
+
+Errors at {COMPARED} instants of the motion; `polypod verify {mech.name} {EXAMPLE}` compares at all.
+
+{verification_markdown(facts)}
 """
 
 

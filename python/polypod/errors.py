@@ -73,6 +73,17 @@ class UnsupportedError(PolypodError):
     """A question that has no answer for this kind of mechanism."""
 
 
+class MissingEngineError(PolypodError):
+    """An engine of `polypod.verify` that is not installed."""
+
+    def __init__(self, engine: str) -> None:
+        self.engine = engine
+        super().__init__(engine)
+
+    def __str__(self) -> str:
+        return f"{self.engine} is not installed; install it with: pip install polypod[verify]"
+
+
 class ShapeError(PolypodError):
     """An array whose shape does not fit."""
 

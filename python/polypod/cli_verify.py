@@ -1,0 +1,98 @@
+"""`polypod verify`: the answers along a motion against other engines."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+import typer
+from rich.console import Console
+from rich.markup import escape
+
+from polypod.cli import JsonOption, MechanismArgument, _bar, _console, _g, _print_json, _table, app
+
+
+@app.command(
+    epilog="Example: [bold]polypod verify lu-3spu-2rpu-r lu-3spu-2rpu-r[/bold]\n\n"
+    "The engines come with: [bold]pip install polypod\\[verify][/bold]"
+)
+def verify(
+    mechanism: MechanismArgument,
+    motion: Annotated[
+        str,
+        typer.Argument(metavar="MOTION", help="A motion file (.csv or .toml) or a built-in motion's name."),
+    ],
+    engine: Annotated[
+        list[str] | None,
+        typer.Option(metavar="NAME", help="Engine to compare with, by default pinocchio; repeatable."),
+    ] = None,
+    tolerance: Annotated[
+        float | None,
+        typer.Option(metavar="X", help="Largest relative error that counts as agreement; 1e-9 by default."),
+    ] = None,
+    samples: Annotated[
+        int | None,
+        typer.Option(
+            min=2, metavar="N", help="Compare at N instants evenly over the motion instead of at its own."
+        ),
+    ] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Compare all quantities along a motion with other engines, which know the mechanism file alone.
+
+    The exit status is 1 if an error exceeds the tolerance or a state has no answer to compare.
+    """
+    import numpy as np
+
+    from polypod.mechanism import load
+    from polypod.motion import load_motion
+    from polypod.verify import TOLERANCE
+    from polypod.verify import verify as verify_motion
+
+    mech = load(mechanism)
+    path = load_motion(motion, mech)
+    if samples is not None:
+        path = path.sample(np.linspace(path.time[0], path.time[-1], samples))
+    with _bar("comparing", len(path.time)) as progress:
+        found = verify_motion(
+            mech,
+            path,
+            engine or ("pinocchio",),
+            TOLERANCE if tolerance is None else tolerance,
+            progress=progress,
+        )
+    facts = found.facts()
+    if as_json:
+        _print_json(facts)
+    else:
+        _print_verification(_console(), facts)
+    if not found.agrees:
+        raise typer.Exit(1)
+
+
+def _print_verification(out: Console, facts: dict[str, Any]) -> None:
+    from polypod.verify.report import verdict
+
+    out.print(
+        f"[bold]{escape(facts['mechanism'])}[/bold] along [bold]{escape(facts['motion'])}[/bold]",
+        highlight=False,
+    )
+    for engine in facts["engines"]:
+        title = f"Errors against {engine['engine']} {engine['version']}"
+        headers = ("max error>", "rms>", "relative>", "rms>", "at / s>", "part")
+        table = _table(title, "", "unit", *headers, "")
+        table.box, table.pad_edge, table.collapse_padding = None, False, True
+        for row in engine["quantities"]:
+            errors = (row[key] for key in ("max", "rms", "relative_max", "relative_rms"))
+            time, part = row["worst"]["time"], row["worst"]["part"]
+            table.add_row(
+                row["title"],
+                escape(row["unit"]),
+                *(_g(error, 2) for error in errors),
+                _g(time),
+                escape(part),
+                "" if row["agrees"] else "[bold red]exceeds[/bold red]",
+            )
+        out.print(table)
+        colour = "green" if engine["agrees"] else "red"
+        out.print(f"[bold {colour}]{escape(verdict(facts, engine))}[/bold {colour}]")
+    out.print(f"Relative errors are relative to {facts['relative_to']}.")

@@ -1,0 +1,138 @@
+"""Where the links of a mechanism are at a pose of the platform, from points and axes alone.
+
+A leg's frame is (n, δ, n×δ), as the mechanism file's format defines it; a rod's is (L, n, L×n).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[np.float64]
+Placements = dict[str, Array]
+"""Frame (4, 4) of each body in base axes, by the body's name."""
+
+BASE, PLATFORM = "base", "platform"
+"""Names of these two bodies."""
+
+PARALLEL = 1e-6
+"""rad: planes of legs on one rod that are as parallel as this at home are parallel [T9]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Turning:
+    """The axis that a leg's normal n comes from."""
+
+    side: Literal["base", "platform"]
+    axis: Array
+    """(3,): unit vector in the axes of base or platform."""
+    along: bool
+    """n is the axis itself (R, F), or square to it and to the leg (U)."""
+
+
+def leg_bodies(leg: Mapping[str, Any]) -> tuple[str, str]:
+    """Names of a leg's cylinder and piston."""
+    return f"leg {leg['name']} cylinder", f"leg {leg['name']} piston"
+
+
+def rod_body(rod: Mapping[str, Any]) -> str:
+    """Name of a rod's body."""
+    return f"rod {rod['name']}"
+
+
+def turning_of(geometry: Mapping[str, Any], leg: Mapping[str, Any]) -> Turning | None:
+    """What keeps a leg from spinning: its base joint if that is U, R or F, else its platform joint."""
+    if leg["base"]["rod"] is not None:
+        return Turning("base", unit(geometry["rods"][leg["base"]["rod"]]["axis"]), along=False)
+    sides: tuple[Literal["base", "platform"], ...] = ("base", "platform")
+    for side in sides:
+        joint = leg[side]
+        match joint["joint"]:
+            case "U":
+                return Turning(side, unit(joint["axis"]), along=False)
+            case "R":
+                return Turning(side, unit(joint["axis"]), along=True)
+            case "F":
+                return Turning(side, unit(joint["normal"]), along=True)
+    return None
+
+
+def placements(geometry: Mapping[str, Any], pose: Array, *, zero: bool = False) -> Placements:
+    """Frame of each body, in base axes, with the platform at `pose` (4, 4).
+
+    With `zero` the legs on a rod have the planes that the rod holds them in: parallel where they nearly are.
+    """
+    found: Placements = {PLATFORM: np.array(pose)}
+    normals: dict[int, Array] = {}
+    for leg in geometry["legs"]:
+        start = np.array(leg["base"]["point"])
+        end = pose[:3, :3] @ leg["platform"]["point"] + pose[:3, 3]
+        delta = unit(end - start)
+        n = _normal(turning_of(geometry, leg), pose, delta)
+        rod = leg["base"]["rod"]
+        if rod is not None:
+            first = normals.setdefault(rod, n)
+            if zero and np.linalg.norm(n - first) <= PARALLEL:
+                n = first
+        delta = unit(delta - n * (n @ delta))
+        axes = np.column_stack([n, delta, cross(n, delta)])
+        cylinder, piston = leg_bodies(leg)
+        found[cylinder] = _frame(axes, start)
+        found[piston] = _frame(axes, start + delta * np.linalg.norm(end - start))
+    for k, rod in enumerate(geometry["rods"]):
+        line, n = unit(rod["axis"]), normals[k]
+        found[rod_body(rod)] = _frame(np.column_stack([line, n, cross(line, n)]), rod["point"])
+    return found
+
+
+def _normal(turning: Turning | None, pose: Array, delta: Array) -> Array:
+    if turning is None:
+        return across(delta)[0]
+    axis = turning.axis if turning.side == "base" else pose[:3, :3] @ turning.axis
+    return axis if turning.along else unit(cross(axis, delta))
+
+
+def _frame(axes: Array, origin: ArrayLike) -> Array:
+    frame = np.eye(4)
+    frame[:3, :3], frame[:3, 3] = axes, origin
+    return frame
+
+
+def inverse(frame: Array) -> Array:
+    """Of a homogeneous matrix (4, 4)."""
+    return _frame(frame[:3, :3].T, -frame[:3, :3].T @ frame[:3, 3])
+
+
+def unit(vector: ArrayLike) -> Array:
+    """The direction of a vector (3,); NaN for one of no length."""
+    array = np.asarray(vector, dtype=np.float64)
+    with np.errstate(invalid="ignore"):
+        return np.asarray(array / np.linalg.norm(array))
+
+
+def cross(a: Array, b: Array) -> Array:
+    """The vector a×b of two vectors (3,): numpy's own takes ten times as long for so few numbers."""
+    (x, y, z), (u, v, w) = a, b
+    return np.array([y * w - z * v, z * u - x * w, x * v - y * u])
+
+
+def across(axis: Array) -> tuple[Array, Array]:
+    """Two unit vectors square to a unit vector and to each other."""
+    first = unit(cross(axis, np.eye(3)[np.argmin(np.abs(axis))]))
+    return first, cross(axis, first)
+
+
+def turn_about(axis: Array, start: Array, end: Array) -> float:
+    """The angle, rad, by which a turn about a unit axis takes one direction to another."""
+    across_start = start - axis * (axis @ start)
+    return float(np.arctan2(cross(axis, start) @ end, across_start @ end))
+
+
+def turned(axis: Array, angle: float) -> Array:
+    """(3, 3): the rotation about a unit axis."""
+    hat = np.cross(np.eye(3), axis)
+    return np.asarray(np.eye(3) + np.sin(angle) * hat + (1.0 - np.cos(angle)) * (hat @ hat))

@@ -1,0 +1,254 @@
+"""A mechanism as links, elementary joints and loop closures, which any multibody engine can build.
+
+Made from the mechanism file's numbers and what the file's format says of them, without Polypod's equations
+of motion. Every leg hangs on the base or on its rod, the platform floats, and the platform joints close the
+loops [T59].
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from polypod.mechanism import Mechanism
+from polypod.verify.placement import (
+    BASE,
+    PLATFORM,
+    Placements,
+    across,
+    cross,
+    inverse,
+    leg_bodies,
+    placements,
+    rod_body,
+    turn_about,
+    turned,
+    turning_of,
+    unit,
+)
+
+Array = NDArray[np.float64]
+
+X, Y, Z = np.eye(3)
+"""Axes of a leg's links, n, δ, n×δ; and of a rod's: L, n, L×n."""
+POINT = np.zeros(3)
+
+
+@dataclass(frozen=True, eq=False)
+class Freedom:
+    """An elementary joint at the origin of its body; "free" is no joint at all."""
+
+    kind: Literal["revolute", "prismatic", "spherical", "free"]
+    axis: Array
+    """(3,): unit vector in the axes of the body; of no meaning for spherical and free."""
+
+
+@dataclass(frozen=True, eq=False)
+class Body:
+    """A link, and how it hangs on its parent: by freedoms in series, the first at the parent."""
+
+    name: str
+    parent: str
+    zero: Array
+    """(4, 4): its frame in base axes where all joints are at zero."""
+    freedoms: tuple[Freedom, ...]
+    """Where there is none the link is one with its parent."""
+    mass: float
+    center: Array
+    """(3,): mass centre in the body's frame, m."""
+    inertia: Array
+    """(3, 3): about the mass centre, in the body's axes, kg m^2."""
+
+
+@dataclass(frozen=True, eq=False)
+class Closure:
+    """What a joint that closes a loop demands of two bodies."""
+
+    name: str
+    bodies: tuple[str, str]
+    points: tuple[Array, Array] | None
+    """(3,) each, in the frames of the two bodies: they coincide. None where the bodies share no point."""
+    squares: tuple[tuple[Array, Array], ...]
+    """Axes of the first and of the second body, in their own axes, that stay square: a pair for each turn
+    that the joint does not allow."""
+
+
+@dataclass(frozen=True, eq=False)
+class LegParts:
+    """The links of a leg, and its prismatic joint."""
+
+    name: str
+    cylinder: str
+    piston: str
+    actuated: bool
+    length: float
+    """Distance from B to b where the joint is at zero, m."""
+
+
+@dataclass(frozen=True, eq=False)
+class Multibody:
+    """Links in depth-first order, and the closures of their loops; SI, at home all joints are near zero."""
+
+    name: str
+    bodies: tuple[Body, ...]
+    closures: tuple[Closure, ...]
+    legs: tuple[LegParts, ...]
+    rods: tuple[str, ...]
+    scale: float
+    """What lengths are divided by where they stand beside angles, m."""
+    geometry: Mapping[str, Any]
+    """The mechanism file's numbers in SI, as `Mechanism.geometry`."""
+
+    def start(self, pose: Array) -> Placements:
+        """Frame (4, 4) of each body in base axes with the platform at `pose` (4, 4), from points and axes.
+
+        A start for an engine, which solves the closures by itself.
+        """
+        return placements(self.geometry, pose)
+
+
+def describe(mech: Mechanism) -> Multibody:
+    """The mechanism as bodies, joints and closures [T59]."""
+    geometry = mech.geometry
+    zero = placements(geometry, mech.home, zero=True)
+    bodies, closures, parts = _rods(geometry, zero), [], []
+    for leg in geometry["legs"]:
+        cylinder, piston = leg_bodies(leg)
+        below, rod = leg["base"], leg["base"]["rod"]
+        parent = BASE if rod is None else rod_body(geometry["rods"][rod])
+        bodies.append(_body(cylinder, parent, zero, _base_freedoms(below, zero[cylinder]), leg["cylinder"]))
+        bodies.append(_body(piston, cylinder, zero, (Freedom("prismatic", Y),), leg["piston"]))
+        ends = (POINT, np.array(leg["platform"]["point"]))
+        squares = _platform_squares(leg["platform"])
+        closures.append(Closure(f"leg {leg['name']} platform joint", (piston, PLATFORM), ends, squares))
+        length = float(np.linalg.norm(zero[piston][:3, 3] - zero[cylinder][:3, 3]))
+        parts.append(LegParts(leg["name"], cylinder, piston, leg["actuated"], length))
+    bodies.append(_body(PLATFORM, BASE, zero, (Freedom("free", POINT),), geometry["platform"]))
+    return Multibody(
+        name=mech.name,
+        bodies=depth_first(bodies),
+        closures=tuple(closures),
+        legs=tuple(parts),
+        rods=tuple(rod_body(rod) for rod in geometry["rods"]),
+        scale=mech.characteristic_length,
+        geometry=geometry,
+    )
+
+
+def release(tree: Multibody) -> Multibody:
+    """The same bodies with the platform set free: how they move off the constraints, by convention [T62].
+
+    Each leg follows its point of the platform and turns by the joint that keeps it from spinning, the base
+    joint if it does; a rod follows the first leg that it carries.
+    """
+    bodies, closures = [], []
+    cylinders = {leg.cylinder for leg in tree.legs}
+    for body in tree.bodies:
+        ball = (Freedom("spherical", POINT),)
+        bodies.append(replace(body, parent=BASE, freedoms=ball) if body.name in cylinders else body)
+    for leg, parts in zip(tree.geometry["legs"], tree.legs, strict=True):
+        ends = (POINT, np.array(leg["platform"]["point"]))
+        closures.append(Closure(f"leg {parts.name} end", (parts.piston, PLATFORM), ends, ()))
+        turning = turning_of(tree.geometry, leg)
+        if turning is not None:
+            # U: n is square to the axis; R and F: n is the axis, or n×δ is square to it.
+            other = BASE if turning.side == "base" else PLATFORM
+            pair = (Z if turning.along else X, turning.axis)
+            closures.append(Closure(f"leg {parts.name} spin", (parts.piston, other), None, (pair,)))
+    for k, rod in enumerate(tree.rods):
+        leader = next(
+            parts
+            for leg, parts in zip(tree.geometry["legs"], tree.legs, strict=True)
+            if leg["base"]["rod"] == k
+        )
+        closures.append(Closure(f"{rod} turn", (rod, leader.cylinder), None, ((Y, Y),)))
+    return replace(tree, bodies=depth_first(bodies), closures=tuple(closures))
+
+
+def joint_values(body: Body, zero: Array, now: Array) -> list[float | Array]:
+    """The value of each freedom of a body: angle, displacement, or rotation (3, 3); none for free.
+
+    `zero` and `now` are the body's frame (4, 4) in its parent's, with all joints at zero and now. Where no
+    values give `now`, they are some nearby.
+    """
+    moved = inverse(zero) @ now
+    rotation = moved[:3, :3]
+    values: list[float | Array] = []
+    for i, freedom in enumerate(body.freedoms):
+        match freedom.kind:
+            case "prismatic":
+                values.append(float(freedom.axis @ moved[:3, 3]))
+            case "spherical":
+                values.append(rotation)
+            case "revolute":
+                # The turn that brings the next axis, which turns with this one alone, to where it is.
+                rest = body.freedoms[i + 1 :]
+                seen = rest[0].axis if rest else across(freedom.axis)[0]
+                angle = turn_about(freedom.axis, seen, rotation @ seen)
+                values.append(angle)
+                rotation = turned(freedom.axis, -angle) @ rotation
+    return values
+
+
+def depth_first(bodies: Iterable[Body]) -> tuple[Body, ...]:
+    """Each body directly followed by all that hangs on it, in the given order otherwise."""
+    bodies = list(bodies)
+
+    def below(parent: str) -> list[Body]:
+        return [b for child in bodies if child.parent == parent for b in [child, *below(child.name)]]
+
+    return tuple(below(BASE))
+
+
+def _rods(geometry: Mapping[str, Any], zero: Placements) -> list[Body]:
+    turn = (Freedom("revolute", X),)
+    return [_body(rod_body(rod), BASE, zero, turn, rod["body"]) for rod in geometry["rods"]]
+
+
+def _body(
+    name: str,
+    parent: str,
+    zero: Placements,
+    freedoms: tuple[Freedom, ...],
+    given: Mapping[str, Any] | None,
+) -> Body:
+    """A body with the file's mass, or none."""
+    if given is None:
+        return Body(name, parent, zero[name], freedoms, 0.0, np.zeros(3), np.zeros((3, 3)))
+    center, inertia = np.array(given["center"]), np.array(given["inertia"])
+    return Body(name, parent, zero[name], freedoms, float(given["mass"]), center, inertia)
+
+
+def _base_freedoms(joint: Mapping[str, Any], zero: Array) -> tuple[Freedom, ...]:
+    """Freedoms of a base joint, from the base or rod to the cylinder with the frame `zero`."""
+    about_n = Freedom("revolute", X)
+    match joint["joint"]:
+        case "S":
+            return (Freedom("spherical", POINT),)
+        case "U":
+            axis = unit(joint["axis"])
+            return (Freedom("revolute", zero[:3, :3].T @ axis), about_n)
+        case "R":
+            return (about_n,)
+    return ()
+
+
+def _platform_squares(joint: Mapping[str, Any]) -> tuple[tuple[Array, Array], ...]:
+    """Axes of the piston and of the platform that a platform joint keeps square."""
+    match joint["joint"]:
+        case "S":
+            return ()
+        case "U":
+            return ((X, unit(joint["axis"])),)
+        case "R":
+            first, second = across(unit(joint["axis"]))
+            return ((X, first), (X, second))
+    normal = unit(joint["normal"])
+    along = np.array(joint["axis"]) - normal * (normal @ joint["axis"])
+    direction = unit(along)
+    side = cross(normal, direction)
+    return ((X, direction), (X, side), (Y, side))
