@@ -485,8 +485,9 @@ class Mechanism:
         >>> mech = pp.load("lu-3spu-2rpu-r")
         >>> pose = mech.pose({"alpha": 0.1, "p": -0.3, "h": 0.62, "beta": 0.7, "gamma": 0.6})
         >>> found = mech.singularity_distance(pose)
-        >>> dict(zip(found.coordinates, found.singular.round(3).tolist()))["beta"]
-        [-2.829, 2.823]
+        >>> below, above = found.singular[found.coordinates.index("beta")].tolist()
+        >>> round(below, 3), round(above, 3)
+        (-2.829, 2.823)
         """
         set = ("natural" if "natural" in self._sets else "pose") if set is None else set
         if set not in self._sets:
