@@ -1,0 +1,280 @@
+"""The mechanism in Exudyn: free links, hard constraints, the forces applied, and the motion that comes out.
+
+Exudyn integrates constraints exactly but cannot have redundant ones: some rows of them are released, as many
+as ranks say and `Twin.notes` names [T63]. It gives accelerations and motions; it has no inverse dynamics.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import exudyn
+import numpy as np
+from exudyn import itemInterface as items
+from exudyn.rigidBodyUtilities import AngularVelocity2EulerParameters_t, RotationMatrix2EulerParameters
+from numpy.typing import NDArray
+
+from polypod.status import Status
+from polypod.verify.placement import BASE, PLATFORM, Placements, across, cross
+from polypod.verify.rows import Links, Row, Slide, Start
+from polypod.verify.tree import POINT, Multibody
+
+Array = NDArray[np.float64]
+Drive = Callable[[float], tuple[Array, Array]]
+"""Time, s → forces of the legs (L,), N, positive apart; load on the platform at o (6,), base axes, N and N m."""
+
+NEWTON = 1e-10
+"""Relative and absolute tolerance of the integrator's Newton iteration."""
+SPECTRAL_RADIUS = 0.9
+"""Of the generalised-alpha integrator at infinite frequency: it damps what the constraints excite."""
+
+_OUTPUT = exudyn.OutputVariableType
+_NOW = exudyn.ConfigurationType.Current
+
+
+class Twin:
+    """The mechanism's links and constraints; an Exudyn system is made from them for each start."""
+
+    version: str = exudyn.__version__
+
+    def __init__(self, tree: Multibody) -> None:
+        self.tree = tree
+        self.links = Links(tree)
+        self.centers = {body.name: body.center for body in tree.bodies} | {BASE: POINT}
+        self._released: dict[str, None] = {}
+
+    def notes(self) -> list[str]:
+        """The constraints that Exudyn did without."""
+        if not self._released:
+            return []
+        return [f"Released, because other constraints say the same: {'; '.join(self._released)}."]
+
+    def answer(
+        self, pose: Array, twist: Array, wrench: Array, forces: Array
+    ) -> tuple[dict[str, Any], Status]:
+        """Accelerations at one state under the forces given, SI, base axes; and what became of it.
+
+        Args:
+            pose: (4, 4).
+            twist: (6,).
+            wrench: (6,), load at o in base axes.
+            forces: (legs,), of the prismatic joints.
+        """
+        if not all(np.isfinite(a).all() for a in (pose, twist, wrench, forces)):
+            return {}, Status.INVALID_INPUT
+        start = self.links.start(pose, twist)
+        found: dict[str, Any] = {"closure": start.closure}
+        if start.status is not Status.OK:
+            return found, start.status
+        self._released |= dict.fromkeys(self.links.words(start.redundant))
+        system = System(self, start, lambda t: (forces, wrench))
+        moved = system.accelerations()
+        if moved is None:
+            return found, Status.SINGULAR
+        legs, none = self.tree.legs, np.zeros((0, 3))
+        found |= {
+            "freedoms": start.freedoms,
+            "platform_acceleration": moved[PLATFORM][0],
+            "platform_eps": moved[PLATFORM][1],
+            "leg_eps": np.array([moved[leg.cylinder][1] for leg in legs]),
+            "piston_acceleration": np.array([moved[leg.piston][0] for leg in legs]),
+            "cylinder_acceleration": np.array([moved[leg.cylinder][0] for leg in legs]),
+            "rod_eps": np.array([moved[rod][1] for rod in self.tree.rods]) if self.tree.rods else none,
+        }
+        return found, Status.OK
+
+    def follow(
+        self, pose: Array, twist: Array, drive: Drive, duration: float, steps: int, every: int
+    ) -> Track | None:
+        """The motion under forces from a start, in `steps` equal steps; None where Exudyn gives up.
+
+        Args:
+            pose: (4, 4), of the platform at the start.
+            twist: (6,).
+            drive: forces and load over time, from 0 to `duration`.
+            duration: s.
+            steps: of the integrator.
+            every: steps from one record to the next.
+        """
+        start = self.links.start(pose, twist)
+        return System(self, start, drive).run(duration, steps, every) if start.status is Status.OK else None
+
+
+@dataclass(eq=False)
+class Track:
+    """The recorded motion, the start left out."""
+
+    pose: Array
+    """(N, 4, 4), of the platform."""
+    lengths: Array
+    """(N, legs), m."""
+    closure: float
+    """Largest error of all constraints, also the released ones."""
+
+
+class System:
+    """An Exudyn system at a start."""
+
+    def __init__(self, twin: Twin, start: Start, drive: Drive) -> None:
+        self.twin, self.tree = twin, twin.tree
+        self._container = exudyn.SystemContainer()
+        self.mbs = self._container.AddSystem()
+        self._number = {BASE: self.mbs.AddObject(items.ObjectGround())}
+        for body, twist in zip(self.tree.bodies, start.twists, strict=True):
+            # The efficiency divides the platform's own term alone [T15].
+            share = 1.0 / self.tree.geometry["efficiency"] if body.name == PLATFORM else 1.0
+            inertia = share * body.inertia
+            self._link(body.name, start.placements[body.name], twist, share * body.mass, inertia)
+        for i in np.setdiff1d(np.arange(len(twin.links.rows)), start.redundant):
+            self._constrain(twin.links.rows[i])
+        self._load(drive)
+        self.mbs.Assemble()
+
+    # --- making it ---------------------------------------------------------------------------------------
+
+    def _link(self, name: str, frame: Array, twist: Array, mass: float, inertia: Array) -> None:
+        """A rigid body with its node at the mass centre, and its weight."""
+        turn, arm = frame[:3, :3], frame[:3, :3] @ self.twin.centers[name]
+        parameters = RotationMatrix2EulerParameters(turn)
+        rates = AngularVelocity2EulerParameters_t(twist[3:], parameters)
+        node = items.NodeRigidBodyEP(
+            referenceCoordinates=[*(frame[:3, 3] + arm), *parameters],
+            initialVelocities=[*(twist[:3] + cross(twist[3:], arm)), *rates],
+        )
+        # Diagonal, then yz, xz, xy.
+        six = [*np.diag(inertia), inertia[1, 2], inertia[0, 2], inertia[0, 1]]
+        body = items.ObjectRigidBody(nodeNumber=self.mbs.AddNode(node), mass=mass, inertia=six)
+        self._number[name] = self.mbs.AddObject(body)
+        marker = self.mbs.AddMarker(items.MarkerBodyMass(bodyNumber=self._number[name]))
+        gravity = list(self.tree.geometry["gravity"])
+        self.mbs.AddLoad(items.LoadMassProportional(markerNumber=marker, loadVector=gravity))
+
+    def _marker(self, body: str, axes: Array, point: Array) -> Any:
+        frame = np.eye(4)
+        frame[:3, :3], frame[:3, 3] = axes, point - self.twin.centers[body]
+        return self.mbs.AddMarker(items.MarkerBodyRigid(bodyNumber=self._number[body], localHT=frame))
+
+    def _constrain(self, row: Row) -> None:
+        """A generic joint that has one constraint alone."""
+        if isinstance(row, Slide):
+            # The displacement along the first marker's x.
+            axes, which = (_frame(row.axis, 0), np.eye(3)), 0
+            points = row.points
+        else:
+            # Its first turn keeps y of the first marker square to z of the second.
+            axes, which = (_frame(row.axes[0], 1), _frame(row.axes[1], 2)), 3
+            points = (POINT, POINT)
+        markers = [self._marker(body, *at) for body, *at in zip(row.bodies, axes, points, strict=True)]
+        constrained = [int(i == which) for i in range(6)]
+        self.mbs.AddObject(items.ObjectJointGeneric(markerNumbers=markers, constrainedAxes=constrained))
+
+    def _load(self, drive: Drive) -> None:
+        geometry, mbs, share = self.tree.geometry, self.mbs, 1.0 / self.tree.geometry["efficiency"]
+        held: dict[float, tuple[Array, Array]] = {}
+
+        def at(t: float) -> tuple[Array, Array]:
+            """Many loads ask for the same time."""
+            if t not in held:
+                held.clear()
+                held[t] = drive(t)
+            return held[t]
+
+        for i, leg in enumerate(self.tree.legs):
+            for body, sign in ((leg.piston, 1.0), (leg.cylinder, -1.0)):
+
+                def push(mbs: Any, t: float, load: Any, i: int = i, sign: float = sign) -> list[float]:
+                    return [0.0, sign * float(at(t)[0][i]), 0.0]
+
+                marker = self._marker(body, np.eye(3), POINT)
+                mbs.AddLoad(items.LoadForceVector(markerNumber=marker, bodyFixed=True, loadVectorUserFunction=push))
+        platform = self._marker(PLATFORM, np.eye(3), POINT)
+        for part, kind in ((slice(0, 3), items.LoadForceVector), (slice(3, 6), items.LoadTorqueVector)):
+
+            def pull(mbs: Any, t: float, load: Any, part: slice = part) -> list[float]:
+                return (share * at(t)[1][part]).tolist()  # type: ignore[no-any-return]
+
+            mbs.AddLoad(kind(markerNumber=platform, loadVectorUserFunction=pull))
+        damping = share * np.repeat([geometry["linear_damping"], geometry["angular_damping"]], 3)
+        if damping.any():
+            damper = items.ObjectConnectorRigidBodySpringDamper(
+                markerNumbers=[self._marker(BASE, np.eye(3), POINT), platform], damping=np.diag(damping)
+            )
+            mbs.AddObject(damper)
+
+    # --- using it ----------------------------------------------------------------------------------------
+
+    def accelerations(self) -> dict[str, tuple[Array, Array]] | None:
+        """Of each body at the start: (3,) of its mass centre, of o for the platform; (3,) angular."""
+        solver = exudyn.MainSolverImplicitSecondOrder()
+        settings = _settings(1e-6, 1)
+        # It finds the accelerations that go with forces and constraints before its first step.
+        if not solver.InitializeSolver(self.mbs, settings):
+            return None
+        found = {name: self._acceleration(name) for name in self.twin.links.bodies}
+        solver.FinalizeSolver(self.mbs, settings)
+        return found if all(np.isfinite(a).all() for pair in found.values() for a in pair) else None
+
+    def _acceleration(self, name: str) -> tuple[Array, Array]:
+        point = -self.twin.centers[name] if name == PLATFORM else POINT
+        linear, angular = (
+            np.asarray(self.mbs.GetObjectOutputBody(self._number[name], kind, point, _NOW))
+            for kind in (_OUTPUT.Acceleration, _OUTPUT.AngularAcceleration)
+        )
+        return linear, angular
+
+    def run(self, duration: float, steps: int, every: int) -> Track | None:
+        """`Twin.follow` of this system."""
+        records: dict[int, Placements] = {}
+
+        def record(mbs: Any, t: float) -> bool:
+            step = round(steps * t / duration)
+            if step > 0 and step % every == 0:
+                records[step] = {name: self._placement(name) for name in self.twin.links.bodies}
+            return True
+
+        self.mbs.SetPostStepUserFunction(record)
+        kind = exudyn.DynamicSolverType.GeneralizedAlpha
+        try:
+            good = self.mbs.SolveDynamic(_settings(duration, steps), solverType=kind)
+        except (RuntimeError, ValueError):  # how Exudyn says that a step did not converge
+            return None
+        if not good or len(records) != steps // every:
+            return None
+        poses = np.array([placed[PLATFORM] for placed in records.values()])
+        lengths = np.array([[_distance(placed, leg) for leg in self.tree.legs] for placed in records.values()])
+        closure = max(self.twin.links.worst(placed) for placed in records.values())
+        return Track(poses, lengths, closure)
+
+    def _placement(self, name: str) -> Array:
+        """(4, 4): a body's frame now."""
+        point = -self.twin.centers[name]
+        frame = np.eye(4)
+        number = self._number[name]
+        frame[:3, :3] = np.reshape(
+            self.mbs.GetObjectOutputBody(number, _OUTPUT.RotationMatrix, point, _NOW), (3, 3)
+        )
+        frame[:3, 3] = self.mbs.GetObjectOutputBody(number, _OUTPUT.Position, point, _NOW)
+        return frame
+
+
+def _distance(placed: Placements, leg: Any) -> float:
+    return float(np.linalg.norm(placed[leg.piston][:3, 3] - placed[leg.cylinder][:3, 3]))
+
+
+def _frame(axis: Array, column: int) -> Array:
+    """(3, 3): a rotation with a unit axis in a column."""
+    return np.roll(np.column_stack([axis, *across(axis)]), column, axis=1)
+
+
+def _settings(duration: float, steps: int) -> Any:
+    """Of the second-order generalised-alpha integrator on the constraints themselves, with nothing written."""
+    settings = exudyn.SimulationSettings()
+    settings.solution.file.write = False
+    integration = settings.timeIntegration
+    integration.endTime, integration.numberOfSteps = duration, steps
+    integration.adaptiveStep = False
+    integration.newton.relativeTolerance = integration.newton.absoluteTolerance = NEWTON
+    integration.generalizedAlpha.spectralRadius = SPECTRAL_RADIUS
+    return settings
