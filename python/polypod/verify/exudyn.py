@@ -23,10 +23,12 @@ from polypod.verify.tree import POINT, Multibody
 
 Array = NDArray[np.float64]
 Drive = Callable[[float], tuple[Array, Array]]
-"""Time, s → forces of the legs (L,), N, positive apart; load on the platform at o (6,), base axes, N and N m."""
+"""Time, s → forces of the legs (L,), N, positive apart; load at o (6,), base axes, N and N m."""
 
 NEWTON = 1e-10
 """Relative and absolute tolerance of the integrator's Newton iteration."""
+WIDTH = 2e-5
+"""Of Exudyn's numerical differences at the start, relative."""
 SPECTRAL_RADIUS = 0.9
 """Of the generalised-alpha integrator at infinite frequency: it damps what the constraints excite."""
 
@@ -188,7 +190,9 @@ class System:
                     return [0.0, sign * float(at(t)[0][i]), 0.0]
 
                 marker = self._marker(body, np.eye(3), POINT)
-                mbs.AddLoad(items.LoadForceVector(markerNumber=marker, bodyFixed=True, loadVectorUserFunction=push))
+                mbs.AddLoad(
+                    items.LoadForceVector(markerNumber=marker, bodyFixed=True, loadVectorUserFunction=push)
+                )
         platform = self._marker(PLATFORM, np.eye(3), POINT)
         for part, kind in ((slice(0, 3), items.LoadForceVector), (slice(3, 6), items.LoadTorqueVector)):
 
@@ -206,10 +210,24 @@ class System:
     # --- using it ----------------------------------------------------------------------------------------
 
     def accelerations(self) -> dict[str, tuple[Array, Array]] | None:
-        """Of each body at the start: (3,) of its mass centre, of o for the platform; (3,) angular."""
-        solver = exudyn.MainSolverImplicitSecondOrder()
+        """Of each body at the start: (3,) of its mass centre, of o for the platform; (3,) angular.
+
+        Exudyn takes the constraints' second rates as one-sided differences, with an error proportional to
+        their width: two widths give it away.
+        """
+        wide, narrow = (self._initial(width) for width in (2.0 * WIDTH, WIDTH))
+        if wide is None or narrow is None:
+            return None
+        return {
+            name: (2.0 * narrow[name][0] - wide[name][0], 2.0 * narrow[name][1] - wide[name][1])
+            for name in narrow
+        }
+
+    def _initial(self, width: float) -> dict[str, tuple[Array, Array]] | None:
+        """The accelerations that go with forces and constraints, which Exudyn finds before its first step."""
+        solver: Any = exudyn.MainSolverImplicitSecondOrder()
         settings = _settings(1e-6, 1)
-        # It finds the accelerations that go with forces and constraints before its first step.
+        settings.timeIntegration.newton.numericalDifferentiation.relativeEpsilon = width
         if not solver.InitializeSolver(self.mbs, settings):
             return None
         found = {name: self._acceleration(name) for name in self.twin.links.bodies}
@@ -243,7 +261,9 @@ class System:
         if not good or len(records) != steps // every:
             return None
         poses = np.array([placed[PLATFORM] for placed in records.values()])
-        lengths = np.array([[_distance(placed, leg) for leg in self.tree.legs] for placed in records.values()])
+        lengths = np.array(
+            [[_distance(placed, leg) for leg in self.tree.legs] for placed in records.values()]
+        )
         closure = max(self.twin.links.worst(placed) for placed in records.values())
         return Track(poses, lengths, closure)
 
@@ -269,7 +289,7 @@ def _frame(axis: Array, column: int) -> Array:
 
 
 def _settings(duration: float, steps: int) -> Any:
-    """Of the second-order generalised-alpha integrator on the constraints themselves, with nothing written."""
+    """Of the generalised-alpha integrator of second order, with nothing written to files."""
     settings = exudyn.SimulationSettings()
     settings.solution.file.write = False
     integration = settings.timeIntegration

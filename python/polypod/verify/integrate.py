@@ -8,14 +8,17 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from polypod.errors import PolypodError
 from polypod.mechanism import Mechanism
 from polypod.motion import Motion
 from polypod.status import Status
+from polypod.verify.table import engine_class
 from polypod.verify.tree import describe
 
 Array = NDArray[np.float64]
@@ -24,8 +27,8 @@ ORDER = 2
 """Of Exudyn's generalised-alpha integrator."""
 ORDER_RANGE = (1.8, 2.2)
 """The order measured from the two smallest steps must be within."""
-LIMIT = 1e-5
-"""Largest error that may be left at step zero, extrapolated: radians, lengths over the characteristic length."""
+LIMIT = 1e-6
+"""Largest error that may be left at step zero, extrapolated: radians, parts of the characteristic length."""
 PIECE = 0.5
 """s: longest piece of the motion."""
 STEPS = (25, 50, 100)
@@ -97,16 +100,26 @@ def integrate(
         piece: longest piece to follow from an exact start, s.
         steps: steps to each piece, each twice the one before, at least two; multiples of 5.
         progress: called with the number of runs done and of all.
-    """
-    from polypod.verify.exudyn import Twin
 
-    twin = Twin(describe(mech))
+    Raises:
+        MissingEngineError: Exudyn is not installed.
+        PolypodError: a piece without length, or steps that are not as above.
+    """
+    if not piece > 0.0:
+        raise PolypodError(f"piece is {piece!r} s; must be a positive number")
+    doubled = all(b == 2 * a for a, b in pairwise(steps))
+    if len(steps) < 2 or not doubled or steps[0] < 1 or steps[0] % RECORDS:
+        raise PolypodError(
+            f"steps are {steps}; need two or more, each twice the one before, multiples of {RECORDS}"
+        )
+    twin: Any = engine_class("exudyn")(describe(mech))
     first, last = float(motion.time[0]), float(motion.time[-1])
     count = max(1, int(np.ceil((last - first) / piece - 1e-9)))
     ends = np.linspace(first, last, count + 1)
     found: list[list[Array]] = []
-    closure, released = 0.0, ()
-    for i, (start, end) in enumerate(zip(ends, ends[1:], strict=False)):
+    closure: float = 0.0
+    released: tuple[str, ...] = ()
+    for i, (start, end) in enumerate(pairwise(ends)):
         errors = []
         for j, number in enumerate(steps):
             if progress is not None:
@@ -153,8 +166,8 @@ def _run(
         _turns(track.pose[:, :3, :3] @ right[:, :3, :3].transpose(0, 2, 1)),
         track.lengths - lengths,
     ]
-    start = twin.links.start(state.pose[0], state.twist[0])
-    return np.concatenate(errors, axis=1), track.closure, twin.links.words(start.redundant)
+    placed = twin.links.start(state.pose[0], state.twist[0])
+    return np.concatenate(errors, axis=1), track.closure, twin.links.words(placed.redundant)
 
 
 def _load(mech: Mechanism, path: Motion, pose: Array) -> Array:
@@ -186,7 +199,7 @@ def _judge(
         return Integration(count, 0, piece, (), None, closure, released, agrees=False)
     by_step = [np.concatenate([errors[j] for errors in found]) for j in range(len(steps))]
     sizes = [_errors(errors) for errors in by_step]
-    orders = [None, *(_order(a.lengths, b.lengths) for a, b in zip(sizes, sizes[1:], strict=False))]
+    orders = [None, *(_order(a.lengths, b.lengths) for a, b in pairwise(sizes))]
     measured = tuple(
         Step(piece / number, size, order) for number, size, order in zip(steps, sizes, orders, strict=True)
     )

@@ -1,12 +1,13 @@
 """The mechanism in MuJoCo, whose loops are soft: an approximate check, and how far off the defaults are.
 
-MuJoCo lets every constraint give way by a part 1 - d of what it should hold, with an impedance d that it keeps
-below 0.9999. So its accelerations are good to some thousandths at best. Its inverse dynamics takes the
-loops' forces from how far they gave way, and is of no use here.
+MuJoCo lets every constraint give way by a part 1 - d of what it should hold, with an impedance d of at most
+0.9999. That is applied in passes here: the loops' forces of one are given as forces to the next, so that only
+what is left gives way. Its inverse dynamics takes loops' forces from how far they gave way, and is not used.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 from xml.etree import ElementTree
 
@@ -15,18 +16,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from polypod.status import Status
-from polypod.verify.placement import BASE, PLATFORM, inverse
+from polypod.verify.placement import BASE, PLATFORM, cross, inverse, turn_about
 from polypod.verify.rows import Links, Start
-from polypod.verify.tree import Body, Freedom, Multibody, joint_values
+from polypod.verify.tree import POINT, Body, Closure, Freedom, Multibody, joint_values
 
 Array = NDArray[np.float64]
 
 STIFF = {"solimp": "0.9999 0.9999 0.001 0.5 2", "solref": "0.0002 1"}
 """The highest impedance that MuJoCo takes, at any error, and a time constant of two steps, s."""
+PASSES = 8
+"""Solutions of a state, each with the loops' forces of those before applied as forces."""
 STEP = 1e-4
 """s."""
 LIGHT = 1e-8
-"""Mass that a link without mass gets, as a part of the platform's; MuJoCo moves none without. Inertia likewise."""
+"""Mass of a link that should have none, as a part of the platform's: MuJoCo needs some. Inertia likewise."""
 
 
 def mjcf(tree: Multibody, constraint: dict[str, str] | None = None) -> str:
@@ -39,29 +42,93 @@ def mjcf(tree: Multibody, constraint: dict[str, str] | None = None) -> str:
     root = ElementTree.Element("mujoco", model=tree.name)
     ElementTree.SubElement(root, "compiler", angle="radian", autolimits="true")
     flags = {"gravity": _text(tree.geometry["gravity"]), "timestep": repr(STEP), "integrator": "implicitfast"}
-    ElementTree.SubElement(root, "option", flags | {"solver": "Newton", "iterations": "200", "tolerance": "0"})
+    ElementTree.SubElement(
+        root, "option", flags | {"solver": "Newton", "jacobian": "dense", "tolerance": "0"}
+    )
     nodes = {BASE: ElementTree.SubElement(root, "worldbody")}
     zero = {BASE: np.eye(4)} | {body.name: body.zero for body in tree.bodies}
     for body in tree.bodies:
         nodes[body.name] = _body(nodes[body.parent], tree, body, inverse(zero[body.parent]) @ body.zero)
-    tendons = ElementTree.SubElement(root, "tendon")
     equalities = ElementTree.SubElement(root, "equality")
     for closure in tree.closures:
-        ends = [nodes[body] for body in closure.bodies]
-        if closure.points is None:
-            raise NotImplementedError(f"{closure.name}: MuJoCo's closures are at points")
-        names = [_site(end, f"{closure.name} {i}", p) for i, (end, p) in enumerate(zip(ends, closure.points, strict=True))]
-        tie = {"site1": names[0], "site2": names[1]} | (constraint or {})
-        ElementTree.SubElement(equalities, "connect", tie)
-        for k, axes in enumerate(closure.squares):
-            # Two axes of one length from one point are square if and only if their ends keep their distance.
-            name = f"{closure.name} square {k}"
-            tendon = ElementTree.SubElement(tendons, "spatial", name=name)
-            for i in (0, 1):
-                point = closure.points[i] + tree.scale * axes[i]
-                ElementTree.SubElement(tendon, "site", site=_site(ends[i], f"{name} {i}", point))
-            ElementTree.SubElement(equalities, "tendon", {"tendon1": name} | (constraint or {}))
+        tie = _ties(tree, closure)
+        first, second = (nodes[body] for body in closure.bodies)
+        if tie.cross is not None:
+            first = _cross(first, tree, f"{closure.name} cross", tie.cross)
+        for k, points in enumerate(tie.points):
+            ends = zip((first, second), points, strict=True)
+            names = [
+                _site(node, f"{closure.name} {k} {side}", point) for side, (node, point) in enumerate(ends)
+            ]
+            sites = {"site1": names[0], "site2": names[1]}
+            ElementTree.SubElement(equalities, "connect", sites | (constraint or {}))
     return ElementTree.tostring(root, encoding="unicode")
+
+
+@dataclass(frozen=True, eq=False)
+class Cross:
+    """The cross of a universal joint."""
+
+    origin: Array
+    """(3,), in the first body."""
+    hinge: Array
+    """(3,): axis about which it turns in the first body."""
+    own: Array
+    """(3,): its other axis, in its own axes."""
+    other: Array
+    """(3,): the same, in the axes of the second body."""
+
+
+@dataclass(frozen=True, eq=False)
+class Ties:
+    """A closure by points that coincide: MuJoCo's "connect" alone leaves out no term of the acceleration."""
+
+    points: tuple[tuple[Array, Array], ...]
+    """(3,) each, in the frames of the two bodies, or of the cross and the second body."""
+    cross: Cross | None
+    """Between the two bodies, for a universal joint."""
+
+
+def _ties(tree: Multibody, closure: Closure) -> Ties:
+    """Points on the axes that the two bodies have in common [T64]."""
+    if closure.points is None:
+        raise NotImplementedError(f"{closure.name}: MuJoCo's closures are at points")
+    (a, b), s = closure.points, tree.scale
+    zero = {BASE: np.eye(4)} | {body.name: body.zero for body in tree.bodies}
+    turn = zero[closure.bodies[0]][:3, :3].T @ zero[closure.bodies[1]][:3, :3]
+
+    def along(mine: Array, other: Array) -> tuple[Array, Array]:
+        """Points on an axis, `other` up to its sign, which is as at zero."""
+        return a + s * mine, b + s * np.sign((turn @ other) @ mine) * other
+
+    match closure.squares:
+        case ():
+            return Ties(((a, b),), None)
+        case ((x, y),):
+            mine = turn @ y
+            mine = mine - x * (x @ mine)
+            mine /= np.linalg.norm(mine)
+            return Ties(((POINT, b), (s * mine, b + s * y)), Cross(a, x, mine, y))
+        case ((x, y), (_, z)):
+            return Ties(((a, b), along(x, cross(y, z))), None)
+        case ((x, y), (_, z), (w, _)):
+            first = cross(y, z)
+            return Ties(((a, b), along(x, first), along(w, cross(first, z))), None)
+    raise NotImplementedError(f"{closure.name}: {len(closure.squares)} turns")
+
+
+def _cross(parent: Any, tree: Multibody, name: str, cross: Cross) -> Any:
+    """The cross of a universal joint, a body of hardly any mass."""
+    node = ElementTree.SubElement(parent, "body", name=name, pos=_text(cross.origin))
+    _joint(node, f"{name} 0", Freedom("revolute", cross.hinge))
+    light = LIGHT * _platform_mass(tree)
+    size = _text([light * tree.scale**2] * 3)
+    ElementTree.SubElement(node, "inertial", pos="0 0 0", mass=repr(light), diaginertia=size)
+    return node
+
+
+def _platform_mass(tree: Multibody) -> float:
+    return float(next(body.mass for body in tree.bodies if body.name == PLATFORM))
 
 
 def _body(parent: Any, tree: Multibody, body: Body, place: Array) -> Any:
@@ -72,7 +139,7 @@ def _body(parent: Any, tree: Multibody, body: Body, place: Array) -> Any:
         _joint(node, f"{body.name} {i}", freedom)
     # The efficiency divides the platform's own term alone [T15].
     share = 1.0 / tree.geometry["efficiency"] if body.name == PLATFORM else 1.0
-    light = LIGHT * next(b.mass for b in tree.bodies if b.name == PLATFORM)
+    light = LIGHT * _platform_mass(tree)
     mass = share * body.mass + light * (body.mass == 0.0)
     # Weak axes get a little too: a link turns about each.
     inertia = share * body.inertia + light * tree.scale**2 * np.eye(3)
@@ -113,8 +180,9 @@ def _quaternion(frame: Array) -> Array:
 class Model:
     """A compiled model, with stiff or with MuJoCo's own constraints."""
 
-    def __init__(self, tree: Multibody, constraint: dict[str, str] | None) -> None:
-        self.tree = tree
+    def __init__(self, tree: Multibody, constraint: dict[str, str] | None, passes: int) -> None:
+        self.tree, self.passes = tree, passes
+        self._crosses = [(c, t) for c in tree.closures if (t := _ties(tree, c).cross) is not None]
         self.model = mujoco.MjModel.from_xml_string(mjcf(tree, constraint))
         self.data = mujoco.MjData(self.model)
         self._bodies = {body.name: self.model.body(body.name).id for body in tree.bodies}
@@ -132,7 +200,11 @@ class Model:
         platform = self._bodies[PLATFORM]
         point = start.placements[PLATFORM][:3, 3]
         mujoco.mj_applyFT(model, data, pull[:3], pull[3:], point, platform, data.qfrc_applied)
-        mujoco.mj_forward(model, data)
+        for i in range(self.passes):
+            if i > 0:
+                # What the loops held so far is applied, so that only the rest gives way.
+                data.qfrc_applied += data.qfrc_constraint
+            mujoco.mj_forward(model, data)
         rates = data.qacc.copy()
         drift, linear, angular = np.zeros((3, model.nv)), np.zeros((3, model.nv)), np.zeros((3, model.nv))
         found = {}
@@ -166,13 +238,20 @@ class Model:
                     value = _quaternion(frame)
                 first = self._joint(body.name, i).qposadr[0]
                 data.qpos[first : first + np.size(value)] = value
-        mujoco.mj_kinematics(model, data)
-        mujoco.mj_comPos(model, data)
+        for closure, piece in self._crosses:
+            first, second = (placements[body][:3, :3] for body in closure.bodies)
+            angle = turn_about(piece.hinge, piece.own, first.T @ second @ piece.other)
+            data.qpos[self._joint(f"{closure.name} cross", 0).qposadr[0]] = angle
+        mujoco.mj_fwdPosition(model, data)
         rows = np.zeros((len(self.tree.bodies), 6, model.nv))
         for row, body in zip(rows, self.tree.bodies, strict=True):
             at = start.placements[body.name][:3, 3]
             mujoco.mj_jac(model, data, row[:3], row[3:], at, self._bodies[body.name])
-        data.qvel[:] = np.linalg.lstsq(rows.reshape(-1, model.nv), start.twists.ravel())[0]
+        # The links' twists, and loops that stay closed, which also gives the crosses' rates.
+        held = data.efc_J.reshape(-1, model.nv)
+        both = np.concatenate([rows.reshape(-1, model.nv), held])
+        rates = np.concatenate([start.twists.ravel(), np.zeros(len(held))])
+        data.qvel[:] = np.linalg.lstsq(both, rates)[0]
 
 
 class Twin:
@@ -183,14 +262,18 @@ class Twin:
     def __init__(self, tree: Multibody) -> None:
         self.tree = tree
         self.links = Links(tree)
-        self.stiff, self.default = Model(tree, STIFF), Model(tree, None)
-        self._gap = 0.0
+        self.models = [Model(tree, None, 1), Model(tree, STIFF, 1), Model(tree, STIFF, PASSES)]
+        """MuJoCo as it is, with stiff loops, and what is compared."""
+        self._gaps = [0.0, 0.0]
 
     def notes(self) -> list[str]:
-        """How far MuJoCo's defaults are off."""
+        """How far MuJoCo's soft loops are off."""
+        default, stiff = self._gaps
         return [
-            "With MuJoCo's default solref and solimp the platform's acceleration is off by up to "
-            f"{self._gap:.2g} of itself and gravity; compared here with solimp {STIFF['solimp'].split()[0]}."
+            f"Soft loops: the platform's acceleration is off by up to {default:.2g} of itself and gravity "
+            f"with MuJoCo's default solref and solimp, by {stiff:.2g} with the stiffest, solimp "
+            f"{STIFF['solimp'].split()[0]}; compared after {PASSES} passes, each with the loops' forces of "
+            "those before applied."
         ]
 
     def answer(
@@ -209,10 +292,12 @@ class Twin:
         start = self.links.start(pose, twist)
         if start.status is not Status.OK:
             return {"closure": start.closure}, start.status
-        moved, soft = (m.accelerations(start, twist, wrench, forces) for m in (self.stiff, self.default))
-        right, off = moved[PLATFORM][:3], soft[PLATFORM][:3] - moved[PLATFORM][:3]
-        size = np.linalg.norm(right) + np.linalg.norm(self.tree.geometry["gravity"])
-        self._gap = max(self._gap, float(np.linalg.norm(off) / size) if size > 0.0 else 0.0)
+        *soft, moved = (model.accelerations(start, twist, wrench, forces) for model in self.models)
+        right = moved[PLATFORM][:3]
+        size = float(np.linalg.norm(right) + np.linalg.norm(self.tree.geometry["gravity"]))
+        for i, one in enumerate(soft):
+            off = float(np.linalg.norm(one[PLATFORM][:3] - right))
+            self._gaps[i] = max(self._gaps[i], off / size if size > 0.0 else 0.0)
         legs = self.tree.legs
         return {
             "closure": start.closure,

@@ -20,6 +20,10 @@ Array = NDArray[np.float64]
 
 RANK = 1e-9
 """Singular values below this part of the largest are zero. Redundant ones are below 1e-12."""
+FEASIBLE = 1e-8
+"""How much of the platform's motion, as a part of it, may break the constraints."""
+CLOSED = 1e-10
+"""Largest error of a joint where the links are put, a cosine or a part of the characteristic length."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,14 +105,14 @@ def residual(rows: Sequence[Row], placements: Placements, scale: float) -> Array
         if isinstance(row, Square):
             errors.append((first[:3, :3] @ row.axes[0]) @ (second[:3, :3] @ row.axes[1]))
         else:
-            a, b = (frame[:3, :3] @ p + frame[:3, 3] for frame, p in zip((first, second), row.points, strict=True))
+            a, b = (
+                frame[:3, :3] @ p + frame[:3, 3] for frame, p in zip((first, second), row.points, strict=True)
+            )
             errors.append((first[:3, :3] @ row.axis) @ (b - a) / scale)
     return np.array(errors)
 
 
-def jacobian(
-    rows: Sequence[Row], bodies: Sequence[str], placements: Placements, scale: float
-) -> Array:
+def jacobian(rows: Sequence[Row], bodies: Sequence[str], placements: Placements, scale: float) -> Array:
     """(rows, 6 bodies): of `residual` by the bodies' twists, in pure numbers [T63].
 
     A twist is the velocity of the body's origin over the scale, and the angular velocity, in base axes.
@@ -120,7 +124,10 @@ def jacobian(
         frames = tuple(at[body] for body in row.bodies)
         for body, twist in zip(row.bodies, _gradients(row, *frames), strict=True):
             if body != BASE:
-                out[column[body] :][:6] += [*twist[:3], *(twist[3:] / (1.0 if isinstance(row, Square) else scale))]
+                out[column[body] :][:6] += [
+                    *twist[:3],
+                    *(twist[3:] / (1.0 if isinstance(row, Square) else scale)),
+                ]
     return found
 
 
@@ -139,19 +146,13 @@ def _gradients(row: Row, first: Array, second: Array) -> tuple[Array, Array]:
 def redundant(jacobian: Array) -> NDArray[np.intp]:
     """Rows of (m, n) that others say already: as many as m exceeds the rank, and without them the rank stays.
 
-    Those that take part most in the dependences, by a pivoted QR decomposition of the left null space, so that
-    the rest is as well conditioned as can be.
+    Those that take part most in the dependences, by a pivoted QR decomposition of the left null space, so
+    that the rest is as well conditioned as can be.
     """
     left, sizes, _ = np.linalg.svd(jacobian)
     rank = int(np.sum(sizes > RANK * sizes[0]))
     pivots = qr(left[:, rank:].T, pivoting=True, mode="r")[1]
     return np.sort(pivots[: len(jacobian) - rank])
-
-
-FEASIBLE = 1e-8
-"""How much of the platform's motion, as a part of it, may break the constraints."""
-CLOSED = 1e-10
-"""Largest error of a joint where the links are put, a cosine or a part of the characteristic length."""
 
 
 @dataclass(eq=False)

@@ -30,9 +30,18 @@ class Engine(NamedTuple):
     title: str
     module: str
     driver: str
+    approximate: float | None = None
+    """Tolerance of an engine that is given Polypod's forces and answers with accelerations, all but exact.
+    None for one that is given the motion and answers exactly."""
 
 
-ENGINES = {"pinocchio": Engine("Pinocchio", "pinocchio", "polypod.verify.pinocchio")}
+ENGINES = {
+    "pinocchio": Engine("Pinocchio", "pinocchio", "polypod.verify.pinocchio"),
+    # Exudyn takes numerical differences for its initial accelerations, which leaves some eight digits.
+    "exudyn": Engine("Exudyn", "exudyn", "polypod.verify.exudyn", approximate=1e-6),
+    # MuJoCo's loops are soft, and its links cannot be without mass.
+    "mujoco": Engine("MuJoCo", "mujoco", "polypod.verify.mujoco", approximate=1e-6),
+}
 """The engines by the names that `verify` takes."""
 
 # name → words, unit, what errors are relative to
@@ -41,6 +50,8 @@ QUANTITIES: dict[str, tuple[str, str, str]] = {
     "lengths": ("leg lengths", "m", "length"),
     "rates": ("leg rates", "m/s", "speed"),
     "accelerations": ("leg accelerations", "m/s^2", "acceleration"),
+    "platform_acceleration": ("platform, accel.", "m/s^2", "acceleration"),
+    "platform_eps": ("platform, ang. accel.", "rad/s^2", "angular acceleration"),
     "leg_omega": ("legs, ang. velocity", "rad/s", "angular speed"),
     "leg_eps": ("legs, ang. accel.", "rad/s^2", "angular acceleration"),
     "piston_velocity": ("pistons, velocity", "m/s", "speed"),
@@ -56,7 +67,8 @@ QUANTITIES: dict[str, tuple[str, str, str]] = {
 
 RELATIVE_TO = (
     "the greatest value of the quantity among all parts at the same state, or where that is greater to the "
-    "platform's own motion there; constraint forces and torques also to the greatest active force"
+    "platform's own motion there; constraint forces and torques also to the greatest active force, "
+    "accelerations under given forces also to gravity"
 )
 
 
@@ -71,6 +83,22 @@ class Twin(Protocol):
         self, pose: Array, twist: Array, acceleration: Array, wrench: Array
     ) -> tuple[dict[str, Any], Status]:
         """Quantities by name, as `QUANTITIES`, and whatever the engine can tell of its own accuracy."""
+
+
+class Driven(Protocol):
+    """What drives an engine that is given forces, those of `Engine.approximate`."""
+
+    version: str
+
+    def __init__(self, tree: Multibody) -> None: ...
+
+    def notes(self) -> list[str]:
+        """What to know of the engine's answers so far, in sentences."""
+
+    def answer(
+        self, pose: Array, twist: Array, wrench: Array, forces: Array
+    ) -> tuple[dict[str, Any], Status]:
+        """Quantities by name, as `QUANTITIES`, under a load and Polypod's forces."""
 
 
 class States(NamedTuple):
@@ -106,6 +134,10 @@ class Row:
     relative_max: float
     """Largest error as a part of what `RELATIVE_TO` says of its state."""
     relative_rms: float
+    tolerance: float
+    """Largest relative error that counts as agreement."""
+    approximate: bool
+    """Whether the tolerance is the engine's own, because it has no more digits."""
     part: str
     """The leg or rod with the largest relative error; empty for quantities of the whole."""
     index: int
@@ -132,6 +164,8 @@ class Comparison:
     """Largest error of a joint in the engine's solutions, a cosine or a part of the characteristic length."""
     agrees: bool
     """All states are compared, and no relative error exceeds the tolerance."""
+    notes: tuple[str, ...] = ()
+    """What to know of the engine's answers."""
 
 
 @dataclass(frozen=True)
@@ -165,6 +199,7 @@ class Verification:
                     "without_answer": dict(c.without_answer),
                     "closure": c.closure,
                     "agrees": c.agrees,
+                    "notes": list(c.notes),
                     "quantities": [
                         {
                             "quantity": row.quantity,
@@ -175,7 +210,9 @@ class Verification:
                             "greatest": _finite(row.greatest),
                             "relative_max": _finite(row.relative_max),
                             "relative_rms": _finite(row.relative_rms),
-                            "agrees": row.relative_max <= self.tolerance,
+                            "tolerance": row.tolerance,
+                            "approximate": row.approximate,
+                            "agrees": row.relative_max <= row.tolerance,
                             "worst": {
                                 "part": row.part,
                                 "state": row.index,
@@ -207,7 +244,8 @@ def verify(
         mech: the mechanism.
         motion: its motion; its own load, where it has one, stands for the mechanism's.
         engines: names of `ENGINES`.
-        tolerance: largest relative error that counts as agreement, a pure number.
+        tolerance: largest relative error that counts as agreement, a pure number; approximate engines have
+            their own, `Engine.approximate`.
         progress: called with the number of states done and of all.
 
     Raises:
@@ -251,7 +289,8 @@ def verify_states(
         wrench: load on the platform at o, (N, 6) or (6,), N and N m; the mechanism's own by default.
         wrench_axes: the axes of `wrench`, "base" or "platform".
         engines: names of `ENGINES`.
-        tolerance: largest relative error that counts as agreement, a pure number.
+        tolerance: largest relative error that counts as agreement, a pure number; approximate engines have
+            their own, `Engine.approximate`.
         progress: called with the number of states done and of all.
 
     Raises:
@@ -304,7 +343,7 @@ def _verify(
 ) -> Verification:
     if not 0.0 < tolerance < np.inf:
         raise PolypodError(f"tolerance is {tolerance!r}; must be a positive number")
-    twins = {name: _twin(name) for name in engines}
+    twins = {name: engine_class(name) for name in engines}
     if not twins:
         raise PolypodError(f"engines: there is none; valid: {', '.join(ENGINES)}")
     tree = describe(mech)
@@ -321,14 +360,19 @@ def _verify(
     return Verification(mech.name, motion, tolerance, tuple(comparisons))
 
 
-def _twin(name: str) -> type[Twin]:
-    """The class that drives an engine."""
+def engine_class(name: str) -> type[Twin] | type[Driven]:
+    """The class that drives an engine.
+
+    Raises:
+        UnknownNameError: no such engine.
+        MissingEngineError: it is not installed.
+    """
     if name not in ENGINES:
         raise UnknownNameError("engine", name, ENGINES)
     engine = ENGINES[name]
     if find_spec(engine.module) is None:
         raise MissingEngineError(engine.title)
-    twin: type[Twin] = importlib.import_module(engine.driver).Twin
+    twin: type[Twin] | type[Driven] = importlib.import_module(engine.driver).Twin
     return twin
 
 
@@ -344,6 +388,8 @@ def _own_answers(mech: Mechanism, states: States) -> tuple[Values, NDArray[np.in
     values: Values = {
         name: array for name, array in kinematics._asdict().items() if name in QUANTITIES and array.shape[1]
     }
+    values["platform_acceleration"] = states.acceleration[:, :3]
+    values["platform_eps"] = states.acceleration[:, 3:]
     values["freedoms"] = np.full(len(states.pose), float(mobility.dof + mobility.passive))
     values["forces"] = dynamics.forces
     rows = mech.jacobian(states.pose)[:, mech.dof :]
@@ -364,7 +410,7 @@ def _answers(status: NDArray[np.integer[Any]]) -> NDArray[np.bool_]:
 
 def _compare(
     name: str,
-    kind: type[Twin],
+    kind: type[Twin] | type[Driven],
     tree: Multibody,
     mech: Mechanism,
     states: States,
@@ -377,11 +423,14 @@ def _compare(
     without: dict[str, int] = {}
     both: list[int] = []
     closure = 0.0
-    twin = kind(tree)
-    for i, (pose, twist, acceleration, wrench) in enumerate(
-        zip(*states[:3], _load(tree, states), strict=True)
-    ):
-        found, status = twin.answer(pose, twist, acceleration, wrench)
+    twin: Any = kind(tree)
+    driven = ENGINES[name].approximate is not None
+    loads = _load(tree, states)
+    for i, (pose, twist, acceleration) in enumerate(zip(*states[:3], strict=True)):
+        if driven:
+            found, status = twin.answer(pose, twist, loads[i], mine["forces"][i])
+        else:
+            found, status = twin.answer(pose, twist, acceleration, loads[i])
         closure = max(closure, found.get("closure", 0.0)) if status.has_answer else closure
         own = Status(int(own_status[i]))
         for who, outcome in (("Polypod", own), (ENGINES[name].title, status)):
@@ -396,13 +445,28 @@ def _compare(
     rows: tuple[Row, ...] = ()
     if both:
         values = {q: np.array([found[q] for found in theirs]) for q in mine if q in theirs[0]}
-        scales = _scales(mech, states, values, chosen)
+        weight = float(np.linalg.norm(tree.geometry["gravity"])) if driven else 0.0
+        scales = _scales(mech, states, mine["forces"][chosen], weight, chosen)
+        limit = ENGINES[name].approximate
+        # Counts are exact in any engine.
+        limits = {
+            q: (tolerance, False) if limit is None or q == "freedoms" else (limit, True) for q in values
+        }
         rows = tuple(
-            _row(mech, states, quantity, mine[quantity][chosen], values[quantity], scales, chosen)
+            _row(
+                mech,
+                states,
+                quantity,
+                mine[quantity][chosen],
+                values[quantity],
+                scales,
+                limits[quantity],
+                chosen,
+            )
             for quantity in QUANTITIES
             if quantity in values
         )
-    good = all(row.relative_max <= tolerance for row in rows)
+    good = all(row.relative_max <= row.tolerance for row in rows)
     return Comparison(
         ENGINES[name].title,
         twin.version,
@@ -412,6 +476,7 @@ def _compare(
         without,
         closure,
         good and bool(rows) and len(both) == len(states.pose),
+        tuple(twin.notes()) if driven else (),
     )
 
 
@@ -422,7 +487,9 @@ def _finite(value: float) -> float | None:
 # --- errors -------------------------------------------------------------------------------------------------
 
 
-def _scales(mech: Mechanism, states: States, theirs: Values, chosen: NDArray[np.int64]) -> dict[str, Array]:
+def _scales(
+    mech: Mechanism, states: States, forces: Array, weight: float, chosen: NDArray[np.int64]
+) -> dict[str, Array]:
     """(N,): what each kind of quantity is at least compared with, so that rounding of zero is no error."""
     size = mech.characteristic_length
     twist, acceleration = states.twist[chosen], states.acceleration[chosen]
@@ -432,8 +499,8 @@ def _scales(mech: Mechanism, states: States, theirs: Values, chosen: NDArray[np.
         for part in (slice(0, 3), slice(3, 6))
     )
     speed = velocity + size * turning
-    gain = gain + size * turning_gain + speed**2 / size
-    force = np.max(np.abs(theirs["forces"]), axis=-1)
+    gain = gain + size * turning_gain + speed**2 / size + weight
+    force = np.max(np.abs(forces), axis=-1)
     return {
         "freedoms": np.ones(len(chosen)),
         "length": np.full(len(chosen), size),
@@ -462,6 +529,7 @@ def _row(
     mine: Array,
     theirs: Array,
     scales: Mapping[str, Array],
+    limit: tuple[float, bool],
     chosen: NDArray[np.int64],
 ) -> Row:
     title, unit, kind = QUANTITIES[quantity]
@@ -471,7 +539,7 @@ def _row(
         relative = np.where(errors == 0.0, 0.0, errors / reference)
     at, part = np.unravel_index(int(np.argmax(relative)), relative.shape)
     names = {"rod": mech.rod_names}.get(quantity[:3], mech.leg_names)
-    whole = quantity == "freedoms" or quantity.startswith("constraint")
+    whole = quantity == "freedoms" or quantity.startswith(("constraint", "platform"))
     i = int(chosen[at])
     return Row(
         quantity=quantity,
@@ -482,6 +550,8 @@ def _row(
         greatest=float(values.max()),
         relative_max=float(relative.max()),
         relative_rms=_rms(relative),
+        tolerance=limit[0],
+        approximate=limit[1],
         part="" if whole else names[int(part)],
         index=i,
         time=None if states.time is None else float(states.time[i]),

@@ -1,0 +1,313 @@
+"""Polypod against Exudyn and MuJoCo, which get its forces and answer with accelerations and motions."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import polypod as pp
+from polypod.verify import integrate, table, verify_states
+from polypod.verify.placement import PLATFORM, turned
+from polypod.verify.rows import Links, Square, jacobian, redundant, residual, rows_of
+from polypod.verify.tree import describe
+
+pytest.importorskip("exudyn")
+pytest.importorskip("mujoco")
+
+sys.path.insert(0, str(Path(__file__).parent))
+import test_oracle as cases
+from polypod.verify import mujoco as soft
+
+COLUMNS = 120
+LU = "lu-3spu-2rpu-r"
+ENGINES = ("exudyn", "mujoco")
+CATALOGUE = (*cases.DRAWN, *cases.FILES)
+
+
+def lu_states(times=(0.0, 1.3, 3.63)):
+    """The paper's mechanism and states of the built-in motion."""
+    mech = pp.load(LU)
+    motion = pp.load_motion(LU, mech).sample(times)
+    state = mech.state(motion.coordinates, motion.rates, motion.second_rates, branch=motion.branch)
+    return mech, (state.pose, state.twist, state.acceleration)
+
+
+def exceeding(found):
+    return {row.quantity for row in found.comparisons[0].rows if row.relative_max > row.tolerance}
+
+
+# --- constraints as rows ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["rod-lined", "passive", "fpf", "upr", "3-rpr-planar"])
+def test_rows_hold_and_their_jacobian_is_their_derivative(name):
+    case = cases.case(name)
+    tree = describe(case.mech)
+    rows, bodies = rows_of(tree), [body.name for body in tree.bodies]
+    for pose in case.T[::9]:
+        placed = tree.start(pose)
+        assert np.abs(residual(rows, placed, tree.scale)).max() < 1e-13
+        exact = jacobian(rows, bodies, placed, tree.scale)
+        h = 1e-6
+        for column in range(exact.shape[1]):
+            body, i = bodies[column // 6], column % 6
+            ends = []
+            for side in (h, -h):
+                moved = placed | {body: placed[body].copy()}
+                if i < 3:
+                    moved[body][i, 3] += side * tree.scale
+                else:
+                    moved[body][:3, :3] = turned(np.eye(3)[i - 3], side) @ moved[body][:3, :3]
+                ends.append(residual(rows, moved, tree.scale))
+            assert np.allclose((ends[0] - ends[1]) / (2 * h), exact[:, column], atol=1e-8)
+
+
+@pytest.mark.parametrize("name", CATALOGUE)
+def test_as_many_rows_are_released_as_mobility_says(name):
+    case = cases.any_case(name)
+    links = Links(describe(case.mech))
+    mobility = case.mech.mobility()
+    start = links.start(case.T[0], case.twist[0])
+    assert start.status is pp.Status.OK
+    assert start.freedoms == mobility.dof + mobility.passive
+    assert len(links.rows) - len(start.redundant) == 6 * len(links.bodies) - start.freedoms
+    kept = np.delete(
+        jacobian(links.rows, links.bodies, start.placements, links.tree.scale), start.redundant, axis=0
+    )
+    assert np.linalg.matrix_rank(kept, tol=1e-6) == len(kept)
+
+
+def test_what_is_released_on_the_paper_s_mechanism():
+    """The two redundant constraints of the legs on one rod are turns of those legs."""
+    mech, (pose, twist, _) = lu_states()
+    links = Links(describe(mech))
+    for at, moving in zip(pose, twist, strict=True):
+        released = [links.rows[i] for i in links.start(at, moving).redundant]
+        assert len(released) == 2
+        assert all(isinstance(row, Square) for row in released)
+        assert all("leg 1" in row.name or "leg 3" in row.name for row in released)
+
+
+def test_redundant_rows():
+    rows = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 2.0, 0.0], [0.0, 0.0, 1.0]])
+    assert redundant(rows).tolist() in ([1], [2])
+    assert redundant(rows[[0, 1, 3]]).tolist() == []
+
+
+# --- accelerations ------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_paper_s_mechanism(engine):
+    mech, states = lu_states()
+    found = verify_states(mech, *states, engines=[engine])
+    assert found.agrees, exceeding(found)
+    assert found.comparisons[0].compared == 3
+    for row in found.comparisons[0].rows:
+        assert row.approximate == (row.quantity != "freedoms")
+        assert row.tolerance == (table.ENGINES[engine].approximate if row.approximate else found.tolerance)
+    (note,) = found.comparisons[0].notes
+    assert ("Released" in note) == (engine == "exudyn")
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("name", ["rod-lined", "passive", "fpf", "rpr", "3-rps"])
+def test_legs_of_the_catalogue(name, engine):
+    agrees_on(name, engine, every=9)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("name", CATALOGUE)
+def test_all_legs_of_the_catalogue(name, engine):
+    agrees_on(name, engine, every=3)
+
+
+def agrees_on(name, engine, every):
+    case = cases.any_case(name)
+    states = (a[::every] for a in (case.T, case.twist, case.acceleration))
+    found = verify_states(case.mech, *states, engines=[engine])
+    assert found.comparisons[0].without_answer == {}
+    assert found.agrees, exceeding(found)
+
+
+def test_mujoco_s_own_loops_are_far_off():
+    """The default is worse than the stiff, and the stiff worse than what is compared."""
+    mech, (pose, twist, acceleration) = lu_states([1.3])
+    twin = soft.Twin(describe(mech))
+    forces = mech.inverse_dynamics(pose, twist, acceleration).forces[0]
+    own = mech.geometry["load"]
+    start = twin.links.start(pose[0], twist[0])
+    wrench = np.array([*own["force"], *own["torque"]])
+    default, stiff, passes = (
+        np.abs(model.accelerations(start, twist[0], wrench, forces)[PLATFORM] - acceleration[0]).max()
+        for model in twin.models
+    )
+    assert default > 10.0 > 1.0 > stiff > 1e-3 > 1e-6 > passes
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_states_without_answer(engine):
+    mech, (pose, twist, acceleration) = lu_states()
+    pose[0, 1, 3] += 0.01  # off the constraints
+    twist[1] += 1.0  # a motion that breaks them
+    acceleration[2, 0] = np.nan
+    found = verify_states(mech, pose, twist, acceleration, engines=[engine]).comparisons[0]
+    title = table.ENGINES[engine].title
+    assert (found.compared, found.agrees) == (0, False)
+    assert {f"Polypod: {s}" for s in ("OFF_CONSTRAINT", "INVALID_INPUT")} <= found.without_answer.keys()
+    assert any(key.startswith(title) for key in found.without_answer)
+
+
+# --- faults put in on purpose -------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_wrong_forces_are_found(monkeypatch, engine):
+    mech, states = lu_states([1.3])
+    right = pp.Mechanism.inverse_dynamics
+    wrong = lambda *args: (a := right(*args))._replace(forces=a.forces * (1 + 1e-6))  # noqa: E731
+    monkeypatch.setattr(pp.Mechanism, "inverse_dynamics", wrong)
+    assert "platform_acceleration" in exceeding(verify_states(mech, *states, engines=[engine]))
+
+
+def turn_gravity(tables):
+    tables["dynamics"]["gravity"] = [-g for g in tables["dynamics"]["gravity"]]
+
+
+def forget_efficiency(tables):
+    tables["dynamics"]["efficiency"] = 1.0
+
+
+def forget_damping(tables):
+    tables["dynamics"]["angular_damping"] = 0.0
+
+
+def mirror_center(tables):
+    link = tables["legs"][1]["piston"]
+    link["center"] = [-link["center"][0], *link["center"][1:]]
+
+
+def rod_center(tables):
+    tables["rods"][0]["center"] = [-c for c in tables["rods"][0]["center"]]
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize(
+    "fault",
+    [turn_gravity, forget_efficiency, forget_damping, mirror_center, rod_center],
+    ids=lambda f: f.__name__,
+)
+def test_a_fault_in_the_product_is_found(monkeypatch, fault, engine):
+    """Polypod computes with other numbers than the twin."""
+    case = cases.case("rod-lined")
+    tables = case.mech.to_dict()
+    fault(tables)
+    wrong = pp.Mechanism.from_dict(tables)
+    monkeypatch.setattr(table, "describe", lambda mech: describe(case.mech))
+    states = (case.T[:2], case.twist[:2], case.acceleration[:2])
+    assert "platform_acceleration" in exceeding(verify_states(wrong, *states, engines=[engine]))
+
+
+# --- motion -------------------------------------------------------------------------------------------------
+
+
+def short_motion(mech, end=0.5):
+    return pp.load_motion(LU, mech).sample(np.linspace(0.0, end, 51))
+
+
+def test_the_motion_comes_out_at_the_integrator_s_order():
+    mech = pp.load(LU)
+    found = integrate(mech, short_motion(mech), piece=0.25, steps=(10, 20, 40))
+    assert found.agrees
+    assert (found.pieces, found.completed) == (2, 2)
+    assert [step.order is None for step in found.steps] == [True, False, False]
+    assert 1.9 < found.steps[2].order < 2.1
+    assert found.rest.lengths < 0.01 * found.steps[2].errors.lengths
+    assert found.closure < 1e-8
+    assert len(found.released) == 2
+    json.dumps(found.facts(), allow_nan=False)
+
+
+@pytest.mark.slow
+def test_all_of_the_example_motion_comes_out():
+    mech = pp.load(LU)
+    found = integrate(mech, pp.load_motion(LU, mech))
+    assert found.agrees
+    assert found.pieces == 16
+
+
+@pytest.mark.parametrize("fault", ["forces", "time"])
+def test_a_motion_under_wrong_forces_does_not_come_out(monkeypatch, fault):
+    mech = pp.load(LU)
+    right = pp.Mechanism.inverse_dynamics
+
+    def wrong(*args):
+        answer = right(*args)
+        late = np.roll(answer.forces, 1, axis=0)
+        late[0] = late[1]
+        return answer._replace(forces=answer.forces * (1 + 1e-5) if fault == "forces" else late)
+
+    monkeypatch.setattr(pp.Mechanism, "inverse_dynamics", wrong)
+    found = integrate(mech, short_motion(mech, 0.25), steps=(10, 20, 40))
+    assert (found.completed, found.agrees) == (1, False)
+
+
+def test_integrate_wrong_arguments(monkeypatch):
+    mech = pp.load(LU)
+    with pytest.raises(pp.PolypodError, match="piece"):
+        integrate(mech, short_motion(mech), piece=0.0)
+    for steps in ((10,), (10, 30), (4, 8)):
+        with pytest.raises(pp.PolypodError, match="steps"):
+            integrate(mech, short_motion(mech), steps=steps)
+    monkeypatch.setattr(table, "find_spec", lambda module: None)
+    with pytest.raises(pp.PolypodError, match=r"Exudyn is not installed.*polypod\[verify\]"):
+        integrate(mech, short_motion(mech))
+
+
+# --- the command --------------------------------------------------------------------------------------------
+
+
+def test_command(run):
+    args = ("--engine", "exudyn", "--engine", "mujoco", "--samples", "3")
+    status, out, err = run("verify", LU, LU, *args)
+    assert (status, err) == (0, "")
+    for words in (
+        "Errors against Exudyn",
+        "Errors against MuJoCo",
+        "≈ platform, accel.",
+        "Soft loops",
+        "Released",
+    ):
+        assert words in out
+
+
+def test_command_with_integration(run, tmp_path):
+    motion = tmp_path / "short.csv"
+    path = short_motion(pp.load(LU), 0.1)
+    columns = {"time [s]": path.time}
+    columns |= {f"{n} [{'m' if n in 'xyz' else 'rad'}]": a for n, a in path.coordinates.items()}
+    lines = [
+        ",".join(columns),
+        *(",".join(map(repr, row)) for row in np.column_stack([*columns.values()]).tolist()),
+    ]
+    motion.write_text("\n".join(lines))
+    args = ("--engine", "exudyn", "--integrate", "--samples", "11")
+    status, out, _ = run("verify", LU, motion, *args)
+    assert status == 0
+    assert "The motion under the forces, by step" in out
+    assert "left at step zero" in out
+    status, out, _ = run("verify", LU, motion, *args, "--json")
+    assert json.loads(out)["integration"]["agrees"]
+
+
+@pytest.mark.parametrize(("engine", "title"), [("exudyn", "Exudyn"), ("mujoco", "MuJoCo")])
+def test_command_without_the_engine(run, monkeypatch, engine, title):
+    monkeypatch.setattr(table, "find_spec", lambda module: None)
+    status, out, err = run("verify", LU, LU, "--engine", engine)
+    assert (status, out) == (2, "")
+    assert err == f"polypod: {title} is not installed; install it with: pip install polypod[verify]\n"
