@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import functools
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -603,3 +603,58 @@ def test_reactions_are_linear_in_the_load():
     one, two = (mech.joint_reactions(c.T[1], REST, REST, k * load) for k in (1, 2))
     agree(two.reactions, 2 * one.reactions, CLOSED)
     agree(two.least, 2 * one.least, CLOSED)
+
+
+# ------------------------------------------------------------------------------------------------------------
+# Along a motion
+# ------------------------------------------------------------------------------------------------------------
+
+
+def test_solutions_hold_reactions_if_asked(tmp_path, monkeypatch):
+    mech = pp.load("lu-3spu-2rpu-r")
+    motion = pp.load_motion("lu-3spu-2rpu-r", mech).sample(np.linspace(0.0, 1.0, 7))
+    monkeypatch.setattr("polypod.solution.CHUNK", 4)
+    plain_dataset = pp.solve(mech, motion).dataset
+    solution = pp.solve(mech, motion, reactions=True)
+    dataset = solution.dataset
+    assert {*dataset.data_vars} - {*plain_dataset.data_vars} == {
+        "reaction",
+        "reaction_in_joint",
+        "least_reaction",
+        "least_reaction_in_joint",
+        "reaction_determinate",
+        "constraint_wrench",
+    }
+    assert "joint" not in plain_dataset.coords
+    states = (dataset[name].values for name in ("pose", "twist", "acceleration"))
+    answer = mech.joint_reactions(*states)
+    assert dataset["joint"].values.tolist() == [joint.name for joint in answer.joints]
+    assert np.array_equal(dataset["reaction"], answer.reactions)
+    assert np.array_equal(dataset["reaction_in_joint"], answer.reactions_in_joint)
+    assert np.array_equal(dataset["least_reaction"], answer.least)
+    assert np.array_equal(dataset["least_reaction_in_joint"], answer.least_in_joint)
+    assert np.array_equal(dataset["reaction_determinate"], answer.determinate_in_joint)
+    assert np.array_equal(dataset["constraint_wrench"], answer.constraint_wrench)
+    axial = dataset["reaction_in_joint"].sel(joint="prismatic 3", joint_component="force 2")
+    agree(axial.values, dataset["force"].sel(leg="3").values, CLOSED)
+    for suffix in (".nc", ".csv"):
+        solution.save(tmp_path / f"result{suffix}")
+        assert pp.load_solution(tmp_path / f"result{suffix}") == solution
+
+
+def test_the_load_of_a_motion_is_that_of_its_reactions():
+    mech = pp.load("lu-3spu-2rpu-r")
+    motion = pp.load_motion("lu-3spu-2rpu-r", mech).sample(np.linspace(0.0, 1.0, 3))
+    loaded = replace(motion, wrench=np.full((3, 6), 50.0), wrench_axes="platform")
+    dataset = pp.solve(mech, loaded, reactions=True).dataset
+    axial = dataset["reaction_in_joint"].sel(joint="prismatic 2", joint_component="force 2")
+    agree(axial.values, dataset["force"].sel(leg="2").values, CLOSED)
+
+
+def test_the_command_saves_reactions(run, tmp_path):
+    result = tmp_path / "result.nc"
+    command = ("solve", "lu-3spu-2rpu-r", "lu-3spu-2rpu-r", "--samples", "5", "-o", result)
+    assert run(*command)[0] == 0
+    assert "reaction" not in pp.load_solution(result).dataset
+    assert run(*command, "--reactions")[0] == 0
+    assert pp.load_solution(result).dataset["reaction"].sizes == {"time": 5, "joint": 16, "component": 6}
