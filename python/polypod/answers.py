@@ -150,6 +150,56 @@ class CoupledForces(NamedTuple):
     status: Codes
 
 
+@dataclass(frozen=True)
+class Joint:
+    """A joint between two links, whose reaction is told of."""
+
+    name: str
+    """Such as "platform joint 3" or "rod L"."""
+    kind: str
+    """R, S, U or P; F where two links are one, so that the reaction is the load of their connection."""
+    links: tuple[str, str]
+    """The link on the base's side, which acts, and that on the platform's, which is acted on."""
+
+
+class JointReactions(NamedTuple):
+    """What joints do to links [T44-T48]; j joints: rods first, then each leg's from base to platform.
+
+    A reaction is the wrench (F, T), N and N m, of the link on the base's side on that on the platform's, with
+    T about the joint's point. Joint axes: (n, δ, n×δ) of the leg; of a U joint (u, n, u×n), u its own axis;
+    of a rod (L, n, L×n). So R is free about its first axis, U about its first and second; P carries the
+    active force along its second.
+
+    Where redundant constraints leave components open, `reactions` are those without couples in U joints, as
+    far as balance allows (the paper's assumption), and `least` those with the least sum of squares; at
+    determinate components both agree.
+    """
+
+    joints: tuple[Joint, ...]
+    points: Array
+    """(..., j, 3): the joints' points in base axes, m: B, and b for prismatic and platform joints."""
+    axes: Array
+    """(..., j, 3, 3): joint axes to base axes, the axes as columns."""
+    reactions: Array
+    """(..., j, 6): without couples in U joints [T47], in base axes."""
+    reactions_in_joint: Array
+    """(..., j, 6): the same in joint axes."""
+    least: Array
+    """(..., j, 6): least sum of |F|^2 + |T/length|^2 over all joints [T47], in base axes."""
+    least_in_joint: Array
+    """(..., j, 6): the same in joint axes."""
+    determinate: NDArray[np.bool_]
+    """(..., j, 6): which components in base axes balance alone determines [T46]; False without answer."""
+    determinate_in_joint: NDArray[np.bool_]
+    """(..., j, 6): the same in joint axes."""
+    constraint_wrench: Array
+    """(..., 6): on the platform, at o in base axes, of all legs that constrain it, less their active forces.
+
+    Determinate, and no matter of convention; of legs and rods without mass it is the sum of f_c (c, τ) [T48].
+    """
+    status: Codes
+
+
 class Power(NamedTuple):
     """Energies and powers of a motion [T17]; W and J."""
 

@@ -261,6 +261,9 @@ def solve(
             help="Solve at N instants evenly over the motion instead of at its own.",
         ),
     ] = None,
+    reactions: Annotated[
+        bool, typer.Option("--reactions", help="Also save the reactions of all joints.")
+    ] = False,
     as_json: JsonOption = False,
 ) -> None:
     """Solve a mechanism along a motion: kinematics, forces, power and conditioning, saved in RESULT.
@@ -278,7 +281,7 @@ def solve(
     path = load_motion(motion, mech)
     if samples is not None:
         path = path.sample(np.linspace(path.time[0], path.time[-1], samples))
-    solution = _solve_with_progress(mech, path)
+    solution = _solve_with_progress(mech, path, reactions=reactions)
     solution.save(result)
     facts = summarise(mech, solution)
     if as_json:
@@ -308,15 +311,15 @@ def _check_result_path(path: Path, *inputs: str, suffixes: tuple[str, ...] = RES
         )
 
 
-def _solve_with_progress(mech: Mechanism, motion: Motion) -> Solution:
+def _solve_with_progress(mech: Mechanism, motion: Motion, *, reactions: bool = False) -> Solution:
     """Solves, with a bar on the terminal when there is more than a moment's work."""
     from polypod.solution import CHUNK
     from polypod.solution import solve as solve_motion
 
     if len(motion.time) <= CHUNK:
-        return solve_motion(mech, motion)
+        return solve_motion(mech, motion, reactions=reactions)
     with _bar("solving", len(motion.time)) as progress:
-        return solve_motion(mech, motion, progress=progress)
+        return solve_motion(mech, motion, reactions=reactions, progress=progress)
 
 
 def _length_mm(leg: dict[str, Any]) -> str:

@@ -26,6 +26,8 @@ from polypod.answers import (
     GraphLink,
     InverseDynamics,
     InverseKinematics,
+    Joint,
+    JointReactions,
     Kinematics,
     Limit,
     Limits,
@@ -735,6 +737,54 @@ class Mechanism:
         """
         shape, args = self._loaded_states(pose, twist, acceleration, wrench, wrench_axes)
         return InverseDynamics(**_shaped(self._core.inverse_dynamics(*args), shape))
+
+    @property
+    def joint_list(self) -> tuple[Joint, ...]:
+        """All joints: the rods' bearings, then each leg's base, prismatic and platform joint [T44]."""
+        return tuple(
+            Joint(name, kind, (inner, outer)) for name, kind, (inner, outer) in self._core.joint_list()
+        )
+
+    def joint_reactions(
+        self,
+        pose: ArrayLike,
+        twist: ArrayLike,
+        acceleration: ArrayLike,
+        wrench: ArrayLike | None = None,
+        wrench_axes: str = "base",
+        *,
+        length: float | None = None,
+    ) -> JointReactions:
+        """The reaction of every joint of a motion under load, (F, T) at the joint's point [T44-T48].
+
+        Exact where balance determines it, and marked where redundant constraints leave it open. The status is
+        SINGULAR where balance determines no forces, or a leg has no frame.
+
+        Args:
+            pose: (..., 4, 4).
+            twist: (..., 6).
+            acceleration: (..., 6).
+            wrench: load on the platform at o, (..., 6), N and N m; the mechanism's own by default.
+            wrench_axes: the axes of `wrench`, "base" or "platform".
+            length: what torques are divided by in the least sum of squares, m; `characteristic_length` by
+                default.
+
+        >>> import numpy as np, polypod as pp
+        >>> mech = pp.load("lu-3spu-2rpu-r")
+        >>> pose = mech.pose({"alpha": 0.1, "p": -0.3, "h": 0.6, "beta": 0.8, "gamma": 0.6})
+        >>> answer = mech.joint_reactions(pose, np.zeros(6), np.zeros(6))
+        >>> answer.joints[3]
+        Joint(name='platform joint 1', kind='U', links=('piston 1', 'platform'))
+        >>> answer.reactions_in_joint[3, :3].round().tolist()
+        [13167.0, 2427.0, 381.0]
+        >>> answer.determinate_in_joint[3].tolist()
+        [True, False, True, True, True, False]
+        """
+        shape, args = self._loaded_states(pose, twist, acceleration, wrench, wrench_axes)
+        args = (*args, self._length(length))
+        out = _shaped(self._core.joint_reactions(*args), shape)
+        marks = {name: out[name] == 1.0 for name in ("determinate", "determinate_in_joint")}
+        return JointReactions(self.joint_list, **out | marks)
 
     def power(
         self,

@@ -30,6 +30,7 @@ _TIME, _LEG, _ROD = ("time",), ("time", "leg"), ("time", "rod")
 _LEG3, _ROD3, _SIX = ("time", "leg", "axis"), ("time", "rod", "axis"), ("time", "component")
 _LIMIT = ("time", "limit")
 _PAIR = ("time", "leg", "joint_axis")
+_JOINT, _JOINT_AXES = ("time", "joint", "component"), ("time", "joint", "joint_component")
 
 # name → dimensions, unit, symbol, long name
 VARIABLES: dict[str, tuple[tuple[str, ...], str, str, str]] = {
@@ -84,6 +85,17 @@ VARIABLES: dict[str, tuple[tuple[str, ...], str, str, str]] = {
     "binding_limit": (_TIME, "1", "", "index of the limit with the least relative slack; -1 for none"),
     "determinant": (_TIME, "1", "det J", "determinant of the Jacobian in pure numbers"),
     "determinant_rate": (_TIME, "1/s", "(det J)'", "rate of the determinant"),
+    "reaction": (
+        _JOINT,
+        "N and N m",
+        "(F, T)",
+        "reaction of the joint without couples in U joints, base axes",
+    ),
+    "reaction_in_joint": (_JOINT_AXES, "N and N m", "(F, T)", "the same in joint axes"),
+    "least_reaction": (_JOINT, "N and N m", "(F, T)", "reaction of the joint, least in size, base axes"),
+    "least_reaction_in_joint": (_JOINT_AXES, "N and N m", "(F, T)", "the same in joint axes"),
+    "reaction_determinate": (_JOINT_AXES, "1", "", "whether balance alone determines it, in joint axes"),
+    "constraint_wrench": (_SIX, "N and N m", "W_c", "wrench of the constraining legs less active forces"),
 }
 # prefix of the variable, in words, unit, primes
 _ORDERS = (
@@ -94,12 +106,19 @@ _ORDERS = (
 _SYMBOLS = {"alpha": "α", "beta": "β", "gamma": "γ", "x": "X_o", "y": "Y_o", "z": "Z_o"}
 
 
-def solve(mech: Mechanism, motion: Motion, *, progress: Callable[[int, int], None] | None = None) -> Solution:
+def solve(
+    mech: Mechanism,
+    motion: Motion,
+    *,
+    reactions: bool = False,
+    progress: Callable[[int, int], None] | None = None,
+) -> Solution:
     """Kinematics, inverse dynamics, power and conditioning along a motion.
 
     Args:
         mech: the mechanism.
         motion: its motion; its own load, where it has one, stands for the mechanism's.
+        reactions: also the reactions of all joints, see `Mechanism.joint_reactions`.
         progress: called now and then with the number of states done and the number of all.
 
     Returns:
@@ -118,7 +137,8 @@ def solve(mech: Mechanism, motion: Motion, *, progress: Callable[[int, int], Non
     total, parts = len(motion.time), []
     for start in range(0, total, CHUNK):
         chunk = slice(start, min(start + CHUNK, total))
-        parts.append(_solve_chunk(mech, motion, state, chunk))
+        part = _solve_chunk(mech, motion, state, chunk)
+        parts.append(part | _solve_reactions(mech, motion, state, chunk) if reactions else part)
         if progress is not None:
             progress(chunk.stop, total)
     values = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
@@ -209,6 +229,22 @@ def _solve_chunk(mech: Mechanism, motion: Motion, state: State, chunk: slice) ->
     return values
 
 
+def _solve_reactions(mech: Mechanism, motion: Motion, state: State, chunk: slice) -> dict[str, NDArray[Any]]:
+    """The reactions of all joints at some states."""
+    wrench = None if motion.wrench is None else motion.wrench[chunk]
+    answer = mech.joint_reactions(
+        state.pose[chunk], state.twist[chunk], state.acceleration[chunk], wrench, motion.wrench_axes
+    )
+    return {
+        "reaction": answer.reactions,
+        "reaction_in_joint": answer.reactions_in_joint,
+        "least_reaction": answer.least,
+        "least_reaction_in_joint": answer.least_in_joint,
+        "reaction_determinate": answer.determinate_in_joint.astype(np.int8),
+        "constraint_wrench": answer.constraint_wrench,
+    }
+
+
 def _dataset(mech: Mechanism, motion: Motion, values: dict[str, NDArray[Any]]) -> xr.Dataset:
     """The variables with their dimensions, units, names and the inputs that they came from."""
     data: dict[str, Any] = {}
@@ -229,6 +265,8 @@ def _dataset(mech: Mechanism, motion: Motion, values: dict[str, NDArray[Any]]) -
         "axis": ["x", "y", "z"],
         "component": ["linear x", "linear y", "linear z", "angular x", "angular y", "angular z"],
         "joint_axis": ["body", "leg"],
+        "joint": [joint.name for joint in mech.joint_list],
+        "joint_component": ["force 1", "force 2", "force 3", "torque 1", "torque 2", "torque 3"],
         "row": [0, 1, 2, 3],
         "column": [0, 1, 2, 3],
         "rod": list(mech.rod_names),

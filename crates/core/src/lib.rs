@@ -27,6 +27,7 @@ pub mod nearest;
 pub mod paths;
 pub mod quadratic;
 pub mod reach;
+pub mod reactions;
 pub mod real;
 pub mod roots;
 pub mod singularity;

@@ -15,6 +15,7 @@ use polypod_core::limits::Limit;
 use polypod_core::mechanism::Mechanism;
 use polypod_core::modes::{self, Start};
 use polypod_core::nearest::Search;
+use polypod_core::reactions;
 use polypod_core::roots::{self, Node, Precision};
 use polypod_core::singularity::Kind;
 use polypod_core::spec::{Axes, Fault, Spec};
@@ -63,6 +64,7 @@ fn arrays(py: Python<'_>, table: Table) -> PyResult<Bound<'_, PyDict>> {
 }
 
 type LimitRow = (String, &'static str, Vec<usize>, &'static str, f64, f64, f64);
+type JointRow = (String, &'static str, [String; 2]);
 type AllModes<'py> = (Bound<'py, PyDict>, Vec<usize>, Bound<'py, PyArray1<u8>>);
 
 type CoordinateSet = (&'static str, Vec<&'static str>, Option<Vec<bool>>);
@@ -333,6 +335,29 @@ impl PyMechanism {
     ) -> PyResult<Bound<'py, PyDict>> {
         let motion = [&poses, &twists, &accelerations];
         self.loaded(py, motion, wrenches.as_ref(), platform_axes, batch::limits)
+    }
+
+    #[pyo3(signature = (poses, twists, accelerations, wrenches, platform_axes, length))]
+    #[allow(clippy::too_many_arguments)]
+    fn joint_reactions<'py>(
+        &self,
+        py: Python<'py>,
+        poses: Array<'py>,
+        twists: Array<'py>,
+        accelerations: Array<'py>,
+        wrenches: Option<Array<'py>>,
+        platform_axes: bool,
+        length: f64,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        let states = states(&poses, &twists, &accelerations)?;
+        let loads = loads(wrenches.as_ref(), platform_axes, states.poses)?;
+        let table = py.detach(|| batch::joint_reactions(&self.0, &states, &loads, length));
+        arrays(py, table)
+    }
+
+    /// Name, kind and links (towards the base, away from it) of each joint.
+    fn joint_list(&self) -> Vec<JointRow> {
+        reactions::joints(&self.0).into_iter().map(|j| (j.name, j.kind, j.links)).collect()
     }
 
     /// Name, kind, legs (from 0), unit, least and greatest value (infinite where there is none) and scale of each limit.

@@ -6,6 +6,7 @@ mod dynamics;
 mod forward;
 mod kinematics;
 mod limits;
+mod reactions;
 mod singularity;
 
 pub use checks::CONSTRAINT_TOLERANCE;
@@ -18,6 +19,7 @@ pub use kinematics::{
 pub use singularity::{conditioning, determinants, nearest_singular, searched_coordinates, singularities};
 
 pub use limits::limits;
+pub use reactions::joint_reactions;
 
 use crate::mechanism::Mechanism;
 use crate::spatial::{Acceleration, Motion, Pose, Twist};
