@@ -207,7 +207,7 @@ class _Path:
             while solver.status == "running":
                 before = solver.t
                 solver.step()
-                if solver.status != "finished" and not solver.t - before > SHORTEST * self.step:
+                if solver.t < self.until and not solver.t - before > SHORTEST * self.step:
                     return
                 used, first = True, solver.step_size
                 yield _Piece(float(solver.t_old), float(solver.t), _between(chart, solver.dense_output()))
