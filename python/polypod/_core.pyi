@@ -10,6 +10,7 @@ _Array = NDArray[np.float64]
 _Table = dict[str, NDArray[Any]]
 
 __all__ = [
+    "Chart",
     "Faults",
     "Flood",
     "Lattice",
@@ -71,6 +72,17 @@ class Mechanism:
         wrenches: _Array | None,
         platform_axes: bool,
     ) -> _Table: ...
+    def forward_dynamics(
+        self,
+        poses: _Array,
+        twists: _Array,
+        forces: _Array,
+        wrenches: _Array | None,
+        platform_axes: bool,
+    ) -> _Table: ...
+    def equations_of_motion(
+        self, poses: _Array, twists: _Array, set: str | None, names: list[str] | None
+    ) -> tuple[list[str], _Table]: ...
     def power(
         self,
         poses: _Array,
@@ -111,6 +123,14 @@ def unsettled_zeros(
 def singularity_kinds() -> list[tuple[int, str, str]]: ...
 def statuses() -> list[tuple[int, str, str]]: ...
 def fit_poses(mech: Mechanism, poses: _Array) -> _Array: ...
+
+@final
+class Chart:
+    @staticmethod
+    def at(mech: Mechanism, pose: _Array) -> Chart | None: ...
+    def start(self, twist: _Array) -> _Array: ...
+    def state(self, y: _Array) -> tuple[_Array, _Array]: ...
+    def rates(self, y: _Array, forces: _Array, wrench: _Array | None, platform_axes: bool) -> _Array: ...
 
 @final
 class Flood:

@@ -136,6 +136,44 @@ class InverseDynamics(NamedTuple):
     status: Codes
 
 
+class ForwardDynamics(NamedTuple):
+    """What forces do to the platform [T49]."""
+
+    acceleration: Array
+    """(..., 6): a of o in m/s^2, ε in rad/s^2."""
+    constraint: Array
+    """(..., k): multipliers of the independent constraints, as in `InverseDynamics`."""
+    status: Codes
+    """SINGULAR where the constraints depend on one another; actuators need not control the platform."""
+
+
+class EquationsOfMotion(NamedTuple):
+    """The terms of M q'' + C q' + D q' + g = Jᵀ f + Sᵀ W/η in d velocities q' of the platform [T49-T52].
+
+    In platform space q' is the twist V, and the multipliers of the constraints push, too:
+    M A + C V + D V + g = (rows of `mech.jacobian`)ᵀ (f, f_c) + W/η. The efficiency η divides the
+    platform's own mass, weight and damping in M, C, D and g, as it does in `inverse_dynamics`.
+    """
+
+    coordinates: tuple[str, ...]
+    """Names of the d independent coordinates; empty in platform space."""
+    mass: Array
+    """(..., d, d): M, symmetric, positive definite on the motions that the constraints allow."""
+    coriolis: Array
+    """(..., d, d): C, with M' - 2C skew-symmetric on the motions that the constraints allow."""
+    damping: Array
+    """(..., d, d): D, of the platform."""
+    gravity: Array
+    """(..., d): g, the gradient of the potential energy where η is 1."""
+    twist_jacobian: Array
+    """(..., 6, d): S of V = S q'; of a load W on the platform it takes Sᵀ W/η."""
+    leg_jacobian: Array
+    """(..., n, d): J of ℓ' = J q', all legs; of their forces it takes Jᵀ f."""
+    rates: Array
+    """(..., d): q' of the twist."""
+    status: Codes
+
+
 class CoupledForces(NamedTuple):
     """Forces of two legs on one rod, and the torque on the rod [T16]."""
 

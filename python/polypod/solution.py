@@ -142,36 +142,55 @@ def solve(
         if progress is not None:
             progress(chunk.stop, total)
     values = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
-    # Simpson's rule through the states that have a power; before the first gap only.
-    power = values["actuator_power"]
-    known = int(np.argmax(~np.isfinite(power))) if not np.isfinite(power).all() else total
-    values["actuator_work"] = np.full(total, np.nan)
-    if known > 2:
-        values["actuator_work"][:known] = cumulative_simpson(
-            power[:known], x=motion.time[:known], initial=0.0
-        )
+    values["actuator_work"] = work_of(motion.time, values["actuator_power"])
     determinant = Determinant(values["determinant"], values["determinant_rate"], values["status"])
     passages = find_passages(mech, motion, state.pose, determinant)
-    dataset = _dataset(mech, motion, values)
+    attrs: dict[str, str | int] = {
+        "title": f"{mech.name} along {motion.name}",
+        "motion": motion.name,
+        "coordinate_set": motion.set,
+        "branch": motion.branch,
+        "wrench_axes": mech.geometry["load"]["axes"] if motion.wrench is None else motion.wrench_axes,
+    }
+    dataset = dataset_of(mech, motion.time, values, attrs)
     return Solution(dataset.assign_attrs(singularities=json.dumps(passages, ensure_ascii=False)))
 
 
 def _solve_chunk(mech: Mechanism, motion: Motion, state: State, chunk: slice) -> dict[str, NDArray[Any]]:
     """All variables of some states."""
-    pose, twist, acceleration = state.pose[chunk], state.twist[chunk], state.acceleration[chunk]
+
+    def of(part: Any) -> Any:
+        return {name: of(column) for name, column in part.items()} if isinstance(part, dict) else part[chunk]
+
+    wrench = None if motion.wrench is None else motion.wrench[chunk]
+    return variables_of(mech, State(*map(of, state)), wrench, motion.wrench_axes)
+
+
+def work_of(time: Array, power: Array) -> Array:
+    """Work since the start (N,), J, by Simpson's rule through the states before the first without a power."""
+    work = np.full(len(time), np.nan)
+    known = len(time) if np.isfinite(power).all() else int(np.argmax(~np.isfinite(power)))
+    if known > 2:
+        work[:known] = cumulative_simpson(power[:known], x=time[:known], initial=0.0)
+    return work
+
+
+def variables_of(
+    mech: Mechanism, state: State, wrench: Array | None, wrench_axes: str
+) -> dict[str, NDArray[Any]]:
+    """The variables of a solution at states (N,) under a load (N, 6), the mechanism's own for None."""
+    pose, twist, acceleration = state.pose, state.twist, state.acceleration
     legs = mech.inverse_kinematics(pose)
     kin = mech.kinematics(pose, twist, acceleration)
-    wrench = None if motion.wrench is None else motion.wrench[chunk]
     own = mech.geometry["load"]
     loads = np.broadcast_to([*own["force"], *own["torque"]], twist.shape) if wrench is None else wrench
-    load = (wrench, motion.wrench_axes)
+    load = (wrench, wrench_axes)
     dynamics = mech.inverse_dynamics(pose, twist, acceleration, *load)
     power = mech.power(pose, twist, acceleration, *load)
     conditioning, determinant = mech.conditioning(pose), mech.determinant(pose, twist)
     limits = mech.limits(pose, *load, twist=twist, acceleration=acceleration)
     # The first thing that went wrong explains the rest.
-    found = state.status[chunk]
-    status = np.where(found != Status.OK, found, dynamics.status)
+    status = np.where(state.status != Status.OK, state.status, dynamics.status)
     values: dict[str, NDArray[Any]] = {
         "pose": pose,
         "twist": twist,
@@ -225,7 +244,7 @@ def _solve_chunk(mech: Mechanism, motion: Motion, state: State, chunk: slice) ->
         ("coordinate_rate_", state.coordinate_rates),
         ("coordinate_second_rate_", state.coordinate_second_rates),
     ):
-        values |= {prefix + name: column[chunk] for name, column in series.items()}
+        values |= {prefix + name: column for name, column in series.items()}
     return values
 
 
@@ -245,7 +264,9 @@ def _solve_reactions(mech: Mechanism, motion: Motion, state: State, chunk: slice
     }
 
 
-def _dataset(mech: Mechanism, motion: Motion, values: dict[str, NDArray[Any]]) -> xr.Dataset:
+def dataset_of(
+    mech: Mechanism, time: Array, values: dict[str, NDArray[Any]], attrs: dict[str, str | int]
+) -> xr.Dataset:
     """The variables with their dimensions, units, names and the inputs that they came from."""
     data: dict[str, Any] = {}
     for name, array in values.items():
@@ -260,7 +281,7 @@ def _dataset(mech: Mechanism, motion: Motion, values: dict[str, NDArray[Any]]) -
     mobility = mech.mobility()
     rows = [mobility.constraint_rows[i] for i in mobility.independent_rows]
     coords: dict[str, Any] = {
-        "time": (_TIME, motion.time, {"units": "s", "symbol": "t", "long_name": "time"}),
+        "time": (_TIME, time, {"units": "s", "symbol": "t", "long_name": "time"}),
         "leg": list(mech.leg_names),
         "axis": ["x", "y", "z"],
         "component": ["linear x", "linear y", "linear z", "angular x", "angular y", "angular z"],
@@ -277,19 +298,14 @@ def _dataset(mech: Mechanism, motion: Motion, values: dict[str, NDArray[Any]]) -
     if mech.coupled_legs:
         coords["coupled_leg"] = list(mech.coupled_legs)
     coords = {name: value for name, value in coords.items() if _used(name, value, data)}
-    attrs: dict[str, str | int] = {
-        "title": f"{mech.name} along {motion.name}",
+    source = {
         "mechanism": mech.name,
         "mechanism_file": mech.to_toml(),
-        "motion": motion.name,
-        "coordinate_set": motion.set,
-        "branch": motion.branch,
-        "wrench_axes": mech.geometry["load"]["axes"] if motion.wrench is None else motion.wrench_axes,
         "polypod_version": _core.__version__,
     }
     # A mechanism without rods or constraints has no such variables.
     data = {name: variable for name, variable in data.items() if 0 not in variable[1].shape[1:]}
-    return xr.Dataset(data, coords, attrs)
+    return xr.Dataset(data, coords, {**attrs, **source})
 
 
 def _used(name: str, value: Any, data: dict[str, Any]) -> bool:

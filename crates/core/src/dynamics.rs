@@ -42,10 +42,13 @@ pub fn platform_wrench<T: Real>(mech: &Mechanism, platform: &Motion<T>) -> Wrenc
     let a = acceleration.a + acceleration.eps.cross(center) + twist.omega.cross(twist.omega.cross(center));
     let force = inertial_force(body, Vec3::lift(mech.gravity), a);
     let torque = inertial_torque(body, pose.rotation, twist.omega, acceleration.eps);
-    // f_d = -μ v, t_d = -μ ω
-    let damping =
-        Wrench::new(-(twist.v * T::lit(mech.linear_damping)), -(twist.omega * T::lit(mech.angular_damping)));
-    Wrench::at(center, force) + Wrench::new(Vec3::zero(), torque) + damping
+    Wrench::at(center, force) + Wrench::new(Vec3::zero(), torque) + damping_wrench(mech, twist)
+}
+
+/// The platform's damping, a part of [Eq. 42]: `f_d = -μ v, t_d = -μ ω`.
+#[inline(always)]
+pub fn damping_wrench<T: Real>(mech: &Mechanism, twist: &Twist<T>) -> Wrench<T> {
+    Wrench::new(-(twist.v * T::lit(mech.linear_damping)), -(twist.omega * T::lit(mech.angular_damping)))
 }
 
 /// Cylinder, piston and the rods that the leg leads, carried to the platform \[T14\].

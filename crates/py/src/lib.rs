@@ -3,13 +3,14 @@
 // Arguments arrive from Python by value.
 #![allow(clippy::needless_pass_by_value)]
 
+mod simulation;
 mod workspace;
 
 use std::sync::OnceLock;
 
 use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray1};
 use polypod_core::assembly::assemble;
-use polypod_core::batch::{self, Coordinates, Loads, States, Table};
+use polypod_core::batch::{self, Coordinates, Loads, Space, States, Table};
 use polypod_core::coordinates::Set;
 use polypod_core::limits::Limit;
 use polypod_core::mechanism::Mechanism;
@@ -309,6 +310,49 @@ impl PyMechanism {
         self.loaded(py, motion, wrenches.as_ref(), platform_axes, batch::inverse_dynamics)
     }
 
+    #[pyo3(signature = (poses, twists, forces, wrenches, platform_axes))]
+    fn forward_dynamics<'py>(
+        &self,
+        py: Python<'py>,
+        poses: Array<'py>,
+        twists: Array<'py>,
+        forces: Array<'py>,
+        wrenches: Option<Array<'py>>,
+        platform_axes: bool,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        let (poses, twists, forces) = (slice(&poses)?, slice(&twists)?, slice(&forces)?);
+        expect(twists, 6, poses)?;
+        expect(forces, self.0.legs.len(), poses)?;
+        let loads = loads(wrenches.as_ref(), platform_axes, poses)?;
+        let table = py.detach(|| batch::forward_dynamics(&self.0, poses, twists, forces, &loads));
+        arrays(py, table)
+    }
+
+    /// In platform space, or in coordinates of a set: their names, those of the set that are given, and the arrays.
+    #[pyo3(signature = (poses, twists, set, names))]
+    fn equations_of_motion<'py>(
+        &self,
+        py: Python<'py>,
+        poses: Array<'py>,
+        twists: Array<'py>,
+        set: Option<&str>,
+        names: Option<Vec<String>>,
+    ) -> PyResult<(Vec<&'static str>, Bound<'py, PyDict>)> {
+        let (poses, twists) = (slice(&poses)?, slice(&twists)?);
+        expect(twists, 6, poses)?;
+        let (space, names) = match set {
+            None => (Space::Platform, vec![]),
+            Some(set) => {
+                let set = self.set(set)?;
+                let given = batch::searched_coordinates(&self.0, &set, names.as_deref());
+                let names = set.names().iter().zip(&given).filter(|(_, g)| **g).map(|(n, _)| *n).collect();
+                (Space::Coordinates(Box::new(set), given), names)
+            }
+        };
+        let table = py.detach(|| batch::equations_of_motion(&self.0, poses, twists, &space));
+        Ok((names, arrays(py, table)?))
+    }
+
     #[pyo3(signature = (poses, twists, accelerations, wrenches, platform_axes))]
     fn power<'py>(
         &self,
@@ -508,6 +552,7 @@ fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add("Faults", m.py().get_type::<Faults>())?;
     m.add_class::<PyMechanism>()?;
     m.add_function(wrap_pyfunction!(workspace::fit_poses, m)?)?;
+    m.add_class::<simulation::PyChart>()?;
     m.add_class::<workspace::PyFlood>()?;
     m.add_class::<workspace::PyLattice>()?;
     m.add_function(wrap_pyfunction!(zeros, m)?)?;

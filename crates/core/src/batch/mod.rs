@@ -4,6 +4,7 @@ mod checks;
 mod coordinates;
 mod dynamics;
 mod forward;
+mod forward_dynamics;
 mod kinematics;
 mod limits;
 mod reactions;
@@ -13,6 +14,7 @@ pub use checks::CONSTRAINT_TOLERANCE;
 pub use coordinates::{Coordinates, coordinate_values, states};
 pub use dynamics::{Loads, coupled_forces, inverse_dynamics, power};
 pub use forward::{AllModes, assembly_modes, forward_kinematics};
+pub use forward_dynamics::{Space, equations_of_motion, forward_dynamics};
 pub use kinematics::{
     hessians, inverse_kinematics, jacobians, kinematics, platform_acceleration, platform_twist,
 };
