@@ -9,7 +9,7 @@ mod kinematics;
 mod limits;
 mod singularity;
 
-pub use checks::CONSTRAINT_TOLERANCE;
+pub use checks::{CONSTRAINT_TOLERANCE, SINGULAR_PIVOTS};
 pub use coordinates::{Coordinates, coordinate_values, states};
 pub use dynamics::{Loads, coupled_forces, inverse_dynamics, power};
 pub use forward::{AllModes, assembly_modes, forward_kinematics};
