@@ -1,7 +1,7 @@
 //! The chart that a simulation integrates in, one state at a time.
 
 use numpy::{PyArray1, PyArrayMethods};
-use polypod_core::batch::pose_of;
+use polypod_core::batch::{SINGULAR_PIVOTS, pose_of};
 use polypod_core::chart::{Chart, Place};
 use polypod_core::dynamics::load_in_base;
 use polypod_core::forward_dynamics::forward_dynamics;
@@ -89,12 +89,14 @@ impl PyChart {
                 (Wrench::from_array(six(slice(wrench)?)?), axes)
             }
         };
-        let Some(place) = self.place(y)? else {
-            return Ok(PyArray1::from_vec(py, vec![f64::NAN; y.len()]));
-        };
+        let none = vec![f64::NAN; y.len()];
+        let Some(place) = self.place(y)? else { return Ok(PyArray1::from_vec(py, none)) };
         let push: Vec<f64> = mech.actuated().map(|(k, _)| forces[k]).collect();
         let load = load_in_base(load, axes, &place.pose);
         let driven = forward_dynamics(mech, &place.pose, &place.twist, &push, load);
+        if !(driven.pivots > SINGULAR_PIVOTS) {
+            return Ok(PyArray1::from_vec(py, none));
+        }
         let mut rates = y[self.chart.freedoms()..].to_vec();
         rates.extend(self.chart.second_rates(&place, &driven.acceleration));
         Ok(PyArray1::from_vec(py, rates))

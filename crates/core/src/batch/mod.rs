@@ -10,7 +10,7 @@ mod limits;
 mod reactions;
 mod singularity;
 
-pub use checks::CONSTRAINT_TOLERANCE;
+pub use checks::{CONSTRAINT_TOLERANCE, SINGULAR_PIVOTS};
 pub use coordinates::{Coordinates, coordinate_values, states};
 pub use dynamics::{Loads, coupled_forces, inverse_dynamics, power};
 pub use forward::{AllModes, assembly_modes, forward_kinematics};
