@@ -542,6 +542,19 @@ def test_a_leg_along_its_axis_has_no_answer():
     assert no_answer(answer)
 
 
+def test_a_design_that_is_singular_everywhere_has_no_answer():
+    """Similar hexagons with S joints below: the platform keeps a freedom that no actuator holds."""
+    data = pp.load(DATA / "stewart-gough.toml").to_dict()
+    for leg, angle in zip(data["legs"], (10, 50, 130, 170, 250, 290), strict=True):
+        leg["base"] = {"joint": "S", "point": {"radius": 500.0, "angle": angle}}
+        leg["platform"] = {"joint": "U", "point": {"radius": 300.0, "angle": angle}, "axis": [1.0, 0.3, 0.0]}
+    mech = pp.Mechanism.from_dict(data)
+    pose = mech.pose({"x": 0.05, "y": 0.02, "z": 0.7, "rx": 0.1, "ry": -0.2, "rz": 0.3})
+    answer = mech.joint_reactions(pose, REST, REST)
+    assert answer.status == Status.SINGULAR
+    assert no_answer(answer)
+
+
 def test_a_singular_pose_has_no_answer_and_its_neighbours_have():
     """Legs, platform and base in one plane; above it reactions grow as one over the height."""
     data = pp.load(DATA / "stewart-gough.toml").to_dict()
@@ -566,13 +579,14 @@ def test_a_pose_that_misses_its_constraints_by_rounding_has_nearly_the_same_reac
     c = any_case("lu")
     k = 2
     exact = c.mech.joint_reactions(c.T[k], REST, REST)
-    for off in (1e-12, 1e-10, 1e-8):
+    for off in (1e-12, 1e-10, 1e-8, 1e-7):
         T = c.T[k].copy()
         T[:3, 3] += off * np.array([0.3, 1.0, -0.5])
         found = c.mech.joint_reactions(T, REST, REST)
         assert Status(found.status).has_answer
         for a, b in ((found.reactions, exact.reactions), (found.least, exact.least)):
-            assert np.max(np.abs(a - b)) <= 1e6 * off * np.max(np.abs(b))
+            assert np.max(np.abs(a - b)) <= 1e3 * off * np.max(np.abs(b))
+        assert np.array_equal(found.determinate_in_joint, exact.determinate_in_joint)
 
 
 def test_batches_and_broadcasting():

@@ -165,6 +165,94 @@ fn components_are_open_where_constraints_are_redundant() {
     assert!(redundant >= 12, "two mechanisms have redundant constraints: {redundant} joints");
 }
 
+/// Couples of universal joints in the first choice, and all reactions in the second, are square to the self-stress that the
+/// choices differ by; on the published manipulator the first has no couples at all where they are open.
+#[test]
+fn choices_are_least_and_differ_in_open_components_only() {
+    let mut different = 0;
+    for mech in mechanisms().into_iter().filter(|m| m.mobility.redundant > 0) {
+        let joints = reactions::joints(&mech);
+        let length = mech.characteristic_length;
+        for state in samples(&mech) {
+            let found =
+                reactions::solve(&mech, &joints, &state, load(&mech, &state), length).expect("regular");
+            let (mut couples, mut sizes, mut square) = ([0.0; 2], [0.0; 2], 0.0);
+            for (j, (joint, place)) in joints.iter().zip(&found.places).enumerate() {
+                let [assumed, least] = [found.assumed[j], found.least[j]];
+                let step = assumed - least;
+                let product = |a: Wrench<f64>, b: Wrench<f64>| {
+                    a.force.dot(b.force) + a.torque.dot(b.torque) / (length * length)
+                };
+                square += product(step, step);
+                sizes = [sizes[0] + product(least, step), sizes[1] + product(least, least)];
+                if joint.kind == "U" {
+                    let torque = assumed.torque * (1.0 / length);
+                    let along = torque.dot(step.torque) / length;
+                    let own = if step.torque.norm() > 1e-6 { torque.dot(torque) } else { 0.0 };
+                    couples = [couples[0] + along, couples[1] + own];
+                }
+                for (marks, step) in [
+                    (found.determinate[j], step.array()),
+                    (found.determinate_in_joint[j], place.seen(step).array()),
+                ] {
+                    let moved = (0..6).any(|k| marks[k] && step[k].abs() > 1e-9 * sizes[1].sqrt());
+                    assert!(!moved, "{}, {}: {marks:?} {step:?}", mech.name, joint.name);
+                }
+            }
+            let scale = 1e-9 * sizes[1];
+            assert!(
+                sizes[0].abs() <= scale && couples[0].abs() <= scale,
+                "{}: {sizes:?} {couples:?}",
+                mech.name
+            );
+            if mech.name == "lu" {
+                assert!(couples[1] <= 1e-18 * sizes[1], "couples {couples:?}");
+            }
+            different += usize::from(square > 1e-6 * sizes[1]);
+        }
+    }
+    assert!(different > 0);
+}
+
+#[test]
+fn joint_axes_are_right_handed() {
+    for mech in mechanisms() {
+        let places = reactions::places(&mech, &samples(&mech)[0].pose);
+        assert!(places.iter().all(|place| place.axes.rotation_error() < 1e-12), "{}", mech.name);
+    }
+}
+
+/// With the platform's balance: what other legs do to it, and the active forces, are the rest.
+#[test]
+fn the_constraint_wrench_is_what_others_leave() {
+    for mech in mechanisms() {
+        let joints = reactions::joints(&mech);
+        for state in samples(&mech) {
+            let load = load(&mech, &state);
+            let found = reactions::solve(&mech, &joints, &state, load, 1.0).expect("regular");
+            let (active, _) = dynamics::inverse_dynamics(&mech, &state, load);
+            let own = Given::of(&mech, &state, load).platform;
+            let mut rest = found.constraint + own;
+            let mut active = active.iter();
+            for (i, leg) in mech.legs.iter().enumerate() {
+                let force = if leg.actuated { *active.next().expect("one for each") } else { 0.0 };
+                let constrains = mech.constraints.iter().any(|c| c.leg == i)
+                    || (leg.rod.is_some() && mech.legs.iter().filter(|l| l.rod == leg.rod).count() > 1);
+                let k = mech.rods.len() + 3 * i + 2;
+                rest = rest
+                    + if constrains {
+                        leg::row(&leg::position(leg, &state.pose)) * force
+                    } else {
+                        found.least[k].moved(found.places[k].point - state.pose.o)
+                    };
+            }
+            let largest = found.assumed.iter().fold(own.force.norm(), |m, w| m.max(w.force.norm()));
+            let left = rest.force.norm().max(rest.torque.norm());
+            assert!(left <= CLOSED * largest, "{}: {left:e} of {largest:e}", mech.name);
+        }
+    }
+}
+
 /// Everything but the choice of self-stresses, in the number T.
 fn kernels<T: Scalar>(mech: &Mechanism, state: &Motion<f64>, on_platform: &[Wrench<f64>]) -> Vec<f64> {
     let lift = Vec3::<T>::lift;
