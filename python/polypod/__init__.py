@@ -28,6 +28,7 @@ from polypod.singularity import SingularityKind
 from polypod.status import Status
 
 if TYPE_CHECKING:
+    from polypod.control import ComputedTorque
     from polypod.motion import Motion, load_motion
     from polypod.results import Solution, load_solution
     from polypod.solution import solve
@@ -35,6 +36,7 @@ if TYPE_CHECKING:
 
 # Motions and results need scipy and xarray, which take their time to load: only who uses them waits for them.
 _LATER = {
+    "ComputedTorque": "control",
     "Motion": "motion",
     "load_motion": "motion",
     "Solution": "results",
@@ -46,6 +48,7 @@ _LATER = {
 }
 
 __all__ = [
+    "ComputedTorque",
     "CoordinateError",
     "LengthsError",
     "Mechanism",

@@ -10,6 +10,7 @@ _Array = NDArray[np.float64]
 _Table = dict[str, NDArray[Any]]
 
 __all__ = [
+    "Chart",
     "Faults",
     "Flood",
     "Lattice",
@@ -71,6 +72,17 @@ class Mechanism:
         wrenches: _Array | None,
         platform_axes: bool,
     ) -> _Table: ...
+    def forward_dynamics(
+        self,
+        poses: _Array,
+        twists: _Array,
+        forces: _Array,
+        wrenches: _Array | None,
+        platform_axes: bool,
+    ) -> _Table: ...
+    def equations_of_motion(
+        self, poses: _Array, twists: _Array, set: str | None, names: list[str] | None
+    ) -> tuple[list[str], _Table]: ...
     def power(
         self,
         poses: _Array,
@@ -87,6 +99,16 @@ class Mechanism:
         wrenches: _Array | None,
         platform_axes: bool,
     ) -> _Table: ...
+    def joint_reactions(
+        self,
+        poses: _Array,
+        twists: _Array,
+        accelerations: _Array,
+        wrenches: _Array | None,
+        platform_axes: bool,
+        length: float,
+    ) -> _Table: ...
+    def joint_list(self) -> list[tuple[str, str, list[str]]]: ...
     def limit_list(self) -> list[tuple[str, str, list[int], str, float, float, float]]: ...
     def platform_twist(self, poses: _Array, rates: _Array) -> _Table: ...
     def platform_acceleration(self, poses: _Array, twists: _Array, accelerations: _Array) -> _Table: ...
@@ -101,6 +123,14 @@ def unsettled_zeros(
 def singularity_kinds() -> list[tuple[int, str, str]]: ...
 def statuses() -> list[tuple[int, str, str]]: ...
 def fit_poses(mech: Mechanism, poses: _Array) -> _Array: ...
+
+@final
+class Chart:
+    @staticmethod
+    def at(mech: Mechanism, pose: _Array) -> Chart | None: ...
+    def start(self, twist: _Array) -> _Array: ...
+    def state(self, y: _Array) -> tuple[_Array, _Array]: ...
+    def rates(self, y: _Array, forces: _Array, wrench: _Array | None, platform_axes: bool) -> _Array: ...
 
 @final
 class Flood:

@@ -136,6 +136,44 @@ class InverseDynamics(NamedTuple):
     status: Codes
 
 
+class ForwardDynamics(NamedTuple):
+    """What forces do to the platform [T49]."""
+
+    acceleration: Array
+    """(..., 6): a of o in m/s^2, ε in rad/s^2."""
+    constraint: Array
+    """(..., k): multipliers of the independent constraints, as in `InverseDynamics`."""
+    status: Codes
+    """SINGULAR where the constraints depend on one another; actuators need not control the platform."""
+
+
+class EquationsOfMotion(NamedTuple):
+    """The terms of M q'' + C q' + D q' + g = Jᵀ f + Sᵀ W/η in d velocities q' of the platform [T49-T52].
+
+    In platform space q' is the twist V, and the multipliers of the constraints push, too:
+    M A + C V + D V + g = (rows of `mech.jacobian`)ᵀ (f, f_c) + W/η. The efficiency η divides the
+    platform's own mass, weight and damping in M, C, D and g, as it does in `inverse_dynamics`.
+    """
+
+    coordinates: tuple[str, ...]
+    """Names of the d independent coordinates; empty in platform space."""
+    mass: Array
+    """(..., d, d): M, symmetric, positive definite on the motions that the constraints allow."""
+    coriolis: Array
+    """(..., d, d): C, with M' - 2C skew-symmetric on the motions that the constraints allow."""
+    damping: Array
+    """(..., d, d): D, of the platform."""
+    gravity: Array
+    """(..., d): g, the gradient of the potential energy where η is 1."""
+    twist_jacobian: Array
+    """(..., 6, d): S of V = S q'; of a load W on the platform it takes Sᵀ W/η."""
+    leg_jacobian: Array
+    """(..., n, d): J of ℓ' = J q', all legs; of their forces it takes Jᵀ f."""
+    rates: Array
+    """(..., d): q' of the twist."""
+    status: Codes
+
+
 class CoupledForces(NamedTuple):
     """Forces of two legs on one rod, and the torque on the rod [T16]."""
 
@@ -147,6 +185,56 @@ class CoupledForces(NamedTuple):
     """
     torque: Array
     """(...): T_c about the rod's line, N m."""
+    status: Codes
+
+
+@dataclass(frozen=True)
+class Joint:
+    """A joint between two links, whose reaction is told of."""
+
+    name: str
+    """Such as "platform joint 3" or "rod L"."""
+    kind: str
+    """R, S, U or P; F where two links are one, so that the reaction is the load of their connection."""
+    links: tuple[str, str]
+    """The link on the base's side, which acts, and that on the platform's, which is acted on."""
+
+
+class JointReactions(NamedTuple):
+    """What joints do to links [T44-T48]; j joints: rods first, then each leg's from base to platform.
+
+    A reaction is the wrench (F, T), N and N m, of the link on the base's side on that on the platform's, with
+    T about the joint's point. Joint axes: (n, δ, n×δ) of the leg; of a U joint (u, n, u×n), u its own axis;
+    of a rod (L, n, L×n). So R is free about its first axis, U about its first and second; P carries the
+    active force along its second.
+
+    Where redundant constraints leave components open, `reactions` are those without couples in U joints, as
+    far as balance allows (the paper's assumption), and `least` those with the least sum of squares; at
+    determinate components both agree.
+    """
+
+    joints: tuple[Joint, ...]
+    points: Array
+    """(..., j, 3): the joints' points in base axes, m: B, and b for prismatic and platform joints."""
+    axes: Array
+    """(..., j, 3, 3): joint axes to base axes, the axes as columns."""
+    reactions: Array
+    """(..., j, 6): without couples in U joints [T47], in base axes."""
+    reactions_in_joint: Array
+    """(..., j, 6): the same in joint axes."""
+    least: Array
+    """(..., j, 6): least sum of |F|^2 + |T/length|^2 over all joints [T47], in base axes."""
+    least_in_joint: Array
+    """(..., j, 6): the same in joint axes."""
+    determinate: NDArray[np.bool_]
+    """(..., j, 6): which components in base axes balance alone determines [T46]; False without answer."""
+    determinate_in_joint: NDArray[np.bool_]
+    """(..., j, 6): the same in joint axes."""
+    constraint_wrench: Array
+    """(..., 6): on the platform, at o in base axes, of all legs that constrain it, less their active forces.
+
+    Determinate, and no matter of convention; of legs and rods without mass it is the sum of f_c (c, τ) [T48].
+    """
     status: Codes
 
 

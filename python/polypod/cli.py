@@ -261,6 +261,9 @@ def solve(
             help="Solve at N instants evenly over the motion instead of at its own.",
         ),
     ] = None,
+    reactions: Annotated[
+        bool, typer.Option("--reactions", help="Also save the reactions of all joints.")
+    ] = False,
     as_json: JsonOption = False,
 ) -> None:
     """Solve a mechanism along a motion: kinematics, forces, power and conditioning, saved in RESULT.
@@ -278,7 +281,7 @@ def solve(
     path = load_motion(motion, mech)
     if samples is not None:
         path = path.sample(np.linspace(path.time[0], path.time[-1], samples))
-    solution = _solve_with_progress(mech, path)
+    solution = _solve_with_progress(mech, path, reactions=reactions)
     solution.save(result)
     facts = summarise(mech, solution)
     if as_json:
@@ -308,15 +311,15 @@ def _check_result_path(path: Path, *inputs: str, suffixes: tuple[str, ...] = RES
         )
 
 
-def _solve_with_progress(mech: Mechanism, motion: Motion) -> Solution:
+def _solve_with_progress(mech: Mechanism, motion: Motion, *, reactions: bool = False) -> Solution:
     """Solves, with a bar on the terminal when there is more than a moment's work."""
     from polypod.solution import CHUNK
     from polypod.solution import solve as solve_motion
 
     if len(motion.time) <= CHUNK:
-        return solve_motion(mech, motion)
+        return solve_motion(mech, motion, reactions=reactions)
     with _bar("solving", len(motion.time)) as progress:
-        return solve_motion(mech, motion, progress=progress)
+        return solve_motion(mech, motion, reactions=reactions, progress=progress)
 
 
 def _length_mm(leg: dict[str, Any]) -> str:
@@ -395,6 +398,101 @@ def _print_solution(out: Console, facts: dict[str, Any]) -> None:
         out.print("All states have an answer, but some are beyond a limit.")
     else:
         out.print("All states have an answer, within all limits.")
+
+
+# --- simulate -----------------------------------------------------------------------------------------------
+
+
+@app.command(
+    epilog="Example: [bold]polypod simulate lu-3spu-2rpu-r --follow lu-3spu-2rpu-r --until 1 -o run.nc[/bold]"
+)
+def simulate(
+    mechanism: MechanismArgument,
+    result: Annotated[
+        Path,
+        typer.Option(
+            "-o", "--output", metavar="RESULT", help="File for the results: .nc or .csv; it is overwritten."
+        ),
+    ],
+    until: Annotated[float, typer.Option(metavar="T", help="Last time, s.")],
+    step: Annotated[float, typer.Option(metavar="T", help="Time between states of the result, s.")] = 0.01,
+    at: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME=VALUE",
+            help="Coordinate of the pose at the start, such as alpha=10deg; repeatable. By default the "
+            "centre pose, or that of the motion to follow.",
+        ),
+    ] = None,
+    branch: Annotated[int, typer.Option(help="Of the pose at the start: +1 or -1, the sign of sin γ.")] = 1,
+    follow: Annotated[
+        str | None,
+        typer.Option(metavar="MOTION", help="Follow a motion by computed torque; else there are no forces."),
+    ] = None,
+    frequency: Annotated[
+        float, typer.Option(metavar="X", help="Of the decay of errors when following, rad/s.")
+    ] = 20.0,
+    model: Annotated[
+        str | None,
+        typer.Option(
+            metavar="FILE", help="What the controller takes for the mechanism: the same by default."
+        ),
+    ] = None,
+    tolerance: Annotated[float, typer.Option(metavar="X", help="Of the integration, relative.")] = 1e-8,
+    go_on: Annotated[bool, typer.Option("--go-on", help="Pass limits and singularities.")] = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Simulate a mechanism from rest, falling or following a motion, and save the motion in RESULT.
+
+    It ends at the first limit or singularity. The exit status is 1 if it ends without an answer.
+    """
+    from polypod.control import ComputedTorque
+    from polypod.mechanism import load
+    from polypod.motion import load_motion
+    from polypod.quantities import named
+    from polypod.simulation import STOPS
+    from polypod.summary import summarise
+
+    _check_result_path(result, mechanism)
+    mech = load(mechanism)
+    motion = None if follow is None else load_motion(follow, mech)
+    law = None if motion is None else ComputedTorque(load(model) if model else mech, motion, frequency)
+    coordinates = dict(named("--at", text) for text in at or [])
+    if motion is not None and not at:
+        coordinates = {name: float(values[0]) for name, values in motion.coordinates.items()}
+        branch = motion.branch
+    pose = mech.home if not coordinates else _pose_at(mech, coordinates, branch)
+    with _bar("simulating", 1) as progress:
+        solution = mech.simulate(
+            pose,
+            forces=law,
+            until=until,
+            step=step,
+            tolerance=tolerance,
+            stop=() if go_on else STOPS,
+            progress=progress,
+        )
+    solution.save(result)
+    facts, end = summarise(mech, solution), solution.end or {}
+    if as_json:
+        _print_json({**facts, "ended": end, "result": str(result)})
+    else:
+        _print_solution(_console(), facts)
+        _console().print(f"Ended at {end['time']:.9g} s: {escape(end['reason'])}.", highlight=False)
+        _console().print(f"Written: {escape(str(result))}", highlight=False, soft_wrap=True)
+    if end["kind"] == "no answer":
+        raise typer.Exit(1)
+
+
+def _pose_at(mech: Mechanism, coordinates: dict[str, float], branch: int) -> Any:
+    """The pose with these coordinates; wrong input where there is none."""
+    from polypod.status import Status
+
+    state = mech.state(coordinates, branch=branch)
+    status = Status(int(state.status))
+    if not status.has_answer:
+        raise PolypodError(f"--at: {status.message}")
+    return state.pose
 
 
 # --- fk -----------------------------------------------------------------------------------------------------
@@ -736,7 +834,7 @@ def _working(text: str) -> Iterator[None]:
 
 
 @contextmanager
-def _bar(text: str, total: int) -> Iterator[Callable[[int, int], None]]:
+def _bar(text: str, total: int) -> Iterator[Callable[[float, float], None]]:
     """A progress bar on standard error, on a terminal only."""
     from rich.progress import Progress
 
@@ -744,7 +842,7 @@ def _bar(text: str, total: int) -> Iterator[Callable[[int, int], None]]:
     with Progress(console=console, transient=True, disable=not console.is_terminal) as progress:
         task = progress.add_task(text, total=total)
 
-        def update(done: int, of: int) -> None:
+        def update(done: float, of: float) -> None:
             progress.update(task, completed=done, total=of)
 
         yield update

@@ -21,11 +21,15 @@ from polypod.answers import (
     Codes,
     Conditioning,
     CoupledForces,
+    EquationsOfMotion,
+    ForwardDynamics,
     ForwardKinematics,
     GraphJoint,
     GraphLink,
     InverseDynamics,
     InverseKinematics,
+    Joint,
+    JointReactions,
     Kinematics,
     Limit,
     Limits,
@@ -59,6 +63,8 @@ from polypod.units import readable
 
 if TYPE_CHECKING:
     from polypod.lattice import LengthLattice
+    from polypod.results import Solution
+    from polypod.simulation import Input
     from polypod.workspace import Workspace
 
 
@@ -736,6 +742,124 @@ class Mechanism:
         shape, args = self._loaded_states(pose, twist, acceleration, wrench, wrench_axes)
         return InverseDynamics(**_shaped(self._core.inverse_dynamics(*args), shape))
 
+    @property
+    def joint_list(self) -> tuple[Joint, ...]:
+        """All joints: the rods' bearings, then each leg's base, prismatic and platform joint [T44]."""
+        return tuple(
+            Joint(name, kind, (inner, outer)) for name, kind, (inner, outer) in self._core.joint_list()
+        )
+
+    def joint_reactions(
+        self,
+        pose: ArrayLike,
+        twist: ArrayLike,
+        acceleration: ArrayLike,
+        wrench: ArrayLike | None = None,
+        wrench_axes: str = "base",
+        *,
+        length: float | None = None,
+    ) -> JointReactions:
+        """The reaction of every joint of a motion under load, (F, T) at the joint's point [T44-T48].
+
+        Exact where balance determines it, and marked where redundant constraints leave it open. The status is
+        SINGULAR where balance determines no forces, or a leg has no frame.
+
+        Args:
+            pose: (..., 4, 4).
+            twist: (..., 6).
+            acceleration: (..., 6).
+            wrench: load on the platform at o, (..., 6), N and N m; the mechanism's own by default.
+            wrench_axes: the axes of `wrench`, "base" or "platform".
+            length: what torques are divided by in the least sum of squares, m; `characteristic_length` by
+                default.
+
+        >>> import numpy as np, polypod as pp
+        >>> mech = pp.load("lu-3spu-2rpu-r")
+        >>> pose = mech.pose({"alpha": 0.1, "p": -0.3, "h": 0.6, "beta": 0.8, "gamma": 0.6})
+        >>> answer = mech.joint_reactions(pose, np.zeros(6), np.zeros(6))
+        >>> answer.joints[3]
+        Joint(name='platform joint 1', kind='U', links=('piston 1', 'platform'))
+        >>> answer.reactions_in_joint[3, :3].round().tolist()
+        [13167.0, 2427.0, 381.0]
+        >>> answer.determinate_in_joint[3].tolist()
+        [True, False, True, True, True, False]
+        """
+        shape, args = self._loaded_states(pose, twist, acceleration, wrench, wrench_axes)
+        args = (*args, self._length(length))
+        out = _shaped(self._core.joint_reactions(*args), shape)
+        marks = {name: out[name] == 1.0 for name in ("determinate", "determinate_in_joint")}
+        return JointReactions(self.joint_list, **out | marks)
+
+    def forward_dynamics(
+        self,
+        pose: ArrayLike,
+        twist: ArrayLike,
+        forces: ArrayLike,
+        wrench: ArrayLike | None = None,
+        wrench_axes: str = "base",
+    ) -> ForwardDynamics:
+        """The platform's acceleration under forces of the legs, and constraint multipliers [T49].
+
+        The inverse of `inverse_dynamics`. Where the actuators do not control the platform (direct
+        singularities) its acceleration is determined all the same.
+
+        Args:
+            pose: (..., 4, 4).
+            twist: (..., 6).
+            forces: active forces (..., n), N, positive when they push the platform away; those of passive
+                legs are not read.
+            wrench: load on the platform at o, (..., 6), N and N m; the mechanism's own by default.
+            wrench_axes: the axes of `wrench`, "base" or "platform".
+
+        >>> import numpy as np, polypod as pp
+        >>> mech = pp.load("lu-3spu-2rpu-r")
+        >>> pose = mech.pose({"alpha": 0.1, "p": -0.3, "h": 0.6, "beta": 0.8, "gamma": 0.6})
+        >>> holding = mech.inverse_dynamics(pose, np.zeros(6), np.zeros(6)).forces
+        >>> bool(abs(mech.forward_dynamics(pose, np.zeros(6), holding).acceleration).max() < 1e-9)
+        True
+        """
+        states = {"pose": (pose, (4, 4)), "twist": (twist, (6,)), "forces": (forces, (self.n_legs,))}
+        shape, args = self._loaded(wrench, wrench_axes, **states)
+        return ForwardDynamics(**_shaped(self._core.forward_dynamics(*args), shape))
+
+    def equations_of_motion(
+        self, pose: ArrayLike, twist: ArrayLike, coordinates: str | Sequence[str] | None = None
+    ) -> EquationsOfMotion:
+        """Mass matrix, Coriolis matrix, damping and gravity, in platform space or in coordinates [T49-T52].
+
+        Args:
+            pose: (..., 4, 4).
+            twist: (..., 6).
+            coordinates: None for platform space; or a coordinate set of independent coordinates; or the
+                names of `dof` coordinates of one. Of the set `pose` without names those are taken that
+                determine the others best at the centre pose.
+
+        The status is FOLD where the coordinates do not determine rates.
+
+        Raises:
+            CoordinateError: coordinates that make up no set, or that depend on one another (the set `tool`).
+            UnknownNameError: no such set.
+
+        >>> import numpy as np, polypod as pp
+        >>> mech = pp.load("lu-3spu-2rpu-r")
+        >>> pose = mech.pose({"alpha": 0.1, "p": -0.3, "h": 0.6, "beta": 0.8, "gamma": 0.6})
+        >>> terms = mech.equations_of_motion(pose, np.zeros(6), "natural")
+        >>> terms.coordinates, bool((np.linalg.eigvalsh(terms.mass) > 0).all())
+        (('alpha', 'p', 'h', 'beta', 'gamma'), True)
+        """
+        shape, (poses, twists) = self._batch(pose=(pose, (4, 4)), twist=(twist, (6,)))
+        names = None if coordinates is None or isinstance(coordinates, str) else list(coordinates)
+        set = coordinates if names is None else self._set_of(dict.fromkeys(names, 0.0))
+        if set is not None and set not in self._sets:
+            raise UnknownNameError("coordinate set", str(set), self._sets)
+        if set == "tool":
+            raise CoordinateError(
+                "the coordinates of the set tool are not independent: only the direction of the axis counts; "
+                f"take one of {', '.join(name for name in self._sets if name != 'tool')}"
+            )
+        found, table = self._core.equations_of_motion(poses, twists, set, names)
+        return EquationsOfMotion(coordinates=tuple(found), **_shaped(table, shape))
+
     def power(
         self,
         pose: ArrayLike,
@@ -747,6 +871,72 @@ class Mechanism:
         """Energies and every power of their balance [T17]. Arguments as for `inverse_dynamics`."""
         shape, args = self._loaded_states(pose, twist, acceleration, wrench, wrench_axes)
         return Power(**_shaped(self._core.power(*args), shape))
+
+    def simulate(
+        self,
+        pose: ArrayLike,
+        twist: ArrayLike = (0.0,) * 6,
+        *,
+        forces: Input | None = None,
+        wrench: Input | None = None,
+        wrench_axes: str = "base",
+        until: float,
+        step: float,
+        tolerance: float = 1e-10,
+        stop: Sequence[str] = ("limits", "singularity"),
+        sigma_min: float | None = None,
+        progress: Callable[[float, float], None] | None = None,
+    ) -> Solution:
+        """The motion from a state under forces: integration over time on the constraints [T53, T54].
+
+        Args:
+            pose: (4, 4), at time 0.
+            twist: (6,), at time 0; at rest by default.
+            forces: active forces (n,), N, positive when they push the platform away: constant; or a pair of
+                times (k,) and rows (k, n), linear in between; or a function of time, pose (4, 4) and twist
+                (6,), without memory, because trial states are asked for, too. None for no forces.
+            wrench: load on the platform at o, (6,), N and N m, in the same three forms; the mechanism's own
+                by default.
+            wrench_axes: the axes of `wrench`, "base" or "platform".
+            until: the last time, s.
+            step: between the states of the result, and the longest step of the integration, s.
+            tolerance: of the integration, relative, for each of its steps.
+            stop: what ends the motion before: "limits", any limit of `limit_list`; "singularity", a change of
+                the sign of det J.
+            sigma_min: the smallest singular value below which the motion ends, too.
+            progress: called with the time that is reached and the last one.
+
+        Returns:
+            A `Solution` like that of `solve`, with `end`: the time, kind and reason of the end. The last
+            state is the one at which it ends, with its time to the accuracy of the integration.
+
+        Raises:
+            PolypodError: a state to start from that the mechanism cannot have, or numbers that are wrong.
+            ShapeError: forces, load, pose or twist of another shape.
+
+        >>> import polypod as pp
+        >>> mech = pp.load("lu-3spu-2rpu-r")
+        >>> pose = mech.pose({"alpha": 0.1, "p": -0.3, "h": 0.7, "beta": 0.7, "gamma": 0.5})
+        >>> fall = mech.simulate(pose, until=1.0, step=0.01)
+        >>> fall.end["kind"], round(fall.end["time"], 3), fall.end["reason"]
+        ('limit', 0.083, 'stroke max of leg 3')
+        """
+        from polypod.simulation import simulate
+
+        return simulate(
+            self,
+            pose,
+            twist,
+            forces=forces,
+            wrench=wrench,
+            wrench_axes=wrench_axes,
+            until=until,
+            step=step,
+            tolerance=tolerance,
+            stop=stop,
+            sigma_min=sigma_min,
+            progress=progress,
+        )
 
     # --- limits ------------------------------------------------------------------------------------------
 
@@ -837,14 +1027,18 @@ class Mechanism:
         wrench: ArrayLike | None,
         wrench_axes: str,
     ) -> tuple[tuple[int, ...], tuple[Any, ...]]:
-        if wrench_axes not in ("base", "platform"):
-            raise UnknownNameError("wrench_axes", wrench_axes, ("base", "platform"))
+        states = {"pose": (pose, (4, 4)), "twist": (twist, (6,)), "acceleration": (acceleration, (6,))}
+        return self._loaded(wrench, wrench_axes, **states)
+
+    def _loaded(
+        self, wrench: ArrayLike | None, wrench_axes: str, **arguments: tuple[ArrayLike, tuple[int, ...]]
+    ) -> tuple[tuple[int, ...], tuple[Any, ...]]:
+        """The arrays of `_batch`, then the load, if it is not the own one, and whether in platform axes."""
+        check_wrench_axes(wrench_axes)
         if wrench is None:
-            shape, states = self._states(pose, twist, acceleration)
-            return shape, (*states, None, False)
-        shape, arrays = self._batch(
-            pose=(pose, (4, 4)), twist=(twist, (6,)), acceleration=(acceleration, (6,)), wrench=(wrench, (6,))
-        )
+            shape, arrays = self._batch(**arguments)
+            return shape, (*arrays, None, False)
+        shape, arrays = self._batch(**arguments, wrench=(wrench, (6,)))
         return shape, (*arrays, wrench_axes == "platform")
 
     @staticmethod
@@ -875,6 +1069,12 @@ def _positive(name: str, value: float) -> float:
 
 def _from_parts(data: dict[str, Any], text: str | None) -> Mechanism:
     return Mechanism(data, text=text)
+
+
+def check_wrench_axes(name: str) -> None:
+    """Refuses axes that a load cannot be given in."""
+    if name not in ("base", "platform"):
+        raise UnknownNameError("wrench_axes", name, ("base", "platform"))
 
 
 def _number(name: str, value: ArrayLike) -> Array:

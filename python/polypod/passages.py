@@ -79,6 +79,20 @@ def find_passages(
     }
 
 
+def sampled_passages(
+    mech: Mechanism, time: Array, pose: Array, determinant: Determinant, threshold: float = NEAR_SINGULAR
+) -> dict[str, Any]:
+    """The same for states that are known at their instants only: zeros between them are those of cubics."""
+    known = _Known(*map(np.ascontiguousarray, (time, pose, determinant.determinant, determinant.rate)))
+    uncontrolled = mech.mobility().uncontrolled
+    return {
+        "threshold": threshold,
+        "uncontrolled": uncontrolled,
+        "crossings": [] if uncontrolled else [*_crossings(mech, known)],
+        "near": [*_near(mech, known, threshold)],
+    }
+
+
 # --- zeros of det J -----------------------------------------------------------------------------------------
 
 

@@ -42,6 +42,15 @@ class Solution:
         findings: dict[str, Any] = json.loads(self.dataset.attrs["singularities"])
         return findings
 
+    @property
+    def end(self) -> dict[str, Any] | None:
+        """When and why a simulation ended: `time`, s, `kind` and `reason` of `polypod.simulation.End`.
+
+        None for the solution of a given motion.
+        """
+        ended: dict[str, Any] | None = json.loads(self.dataset.attrs.get("end", "null"))
+        return ended
+
     def save(self, path: str | PathLike[str]) -> None:
         """Write a NetCDF 3 file (`.nc`) or a table (`.csv`: one row for each instant); both load back equal.
 

@@ -30,6 +30,7 @@ _TIME, _LEG, _ROD = ("time",), ("time", "leg"), ("time", "rod")
 _LEG3, _ROD3, _SIX = ("time", "leg", "axis"), ("time", "rod", "axis"), ("time", "component")
 _LIMIT = ("time", "limit")
 _PAIR = ("time", "leg", "joint_axis")
+_JOINT, _JOINT_AXES = ("time", "joint", "component"), ("time", "joint", "joint_component")
 
 # name → dimensions, unit, symbol, long name
 VARIABLES: dict[str, tuple[tuple[str, ...], str, str, str]] = {
@@ -84,6 +85,17 @@ VARIABLES: dict[str, tuple[tuple[str, ...], str, str, str]] = {
     "binding_limit": (_TIME, "1", "", "index of the limit with the least relative slack; -1 for none"),
     "determinant": (_TIME, "1", "det J", "determinant of the Jacobian in pure numbers"),
     "determinant_rate": (_TIME, "1/s", "(det J)'", "rate of the determinant"),
+    "reaction": (
+        _JOINT,
+        "N and N m",
+        "(F, T)",
+        "reaction of the joint without couples in U joints, base axes",
+    ),
+    "reaction_in_joint": (_JOINT_AXES, "N and N m", "(F, T)", "the same in joint axes"),
+    "least_reaction": (_JOINT, "N and N m", "(F, T)", "reaction of the joint, least in size, base axes"),
+    "least_reaction_in_joint": (_JOINT_AXES, "N and N m", "(F, T)", "the same in joint axes"),
+    "reaction_determinate": (_JOINT_AXES, "1", "", "whether balance alone determines it, in joint axes"),
+    "constraint_wrench": (_SIX, "N and N m", "W_c", "wrench of the constraining legs less active forces"),
 }
 # prefix of the variable, in words, unit, primes
 _ORDERS = (
@@ -94,12 +106,19 @@ _ORDERS = (
 _SYMBOLS = {"alpha": "α", "beta": "β", "gamma": "γ", "x": "X_o", "y": "Y_o", "z": "Z_o"}
 
 
-def solve(mech: Mechanism, motion: Motion, *, progress: Callable[[int, int], None] | None = None) -> Solution:
+def solve(
+    mech: Mechanism,
+    motion: Motion,
+    *,
+    reactions: bool = False,
+    progress: Callable[[int, int], None] | None = None,
+) -> Solution:
     """Kinematics, inverse dynamics, power and conditioning along a motion.
 
     Args:
         mech: the mechanism.
         motion: its motion; its own load, where it has one, stands for the mechanism's.
+        reactions: also the reactions of all joints, see `Mechanism.joint_reactions`.
         progress: called now and then with the number of states done and the number of all.
 
     Returns:
@@ -112,46 +131,71 @@ def solve(mech: Mechanism, motion: Motion, *, progress: Callable[[int, int], Non
     >>> dict(solution.dataset.force.sizes)
     {'time': 801, 'leg': 5}
     """
-    state = mech.state(
-        motion.coordinates, motion.rates, motion.second_rates, branch=motion.branch, continued=True
-    )
+    state = states_along(mech, motion)
     total, parts = len(motion.time), []
     for start in range(0, total, CHUNK):
         chunk = slice(start, min(start + CHUNK, total))
-        parts.append(_solve_chunk(mech, motion, state, chunk))
+        part = _solve_chunk(mech, motion, state, chunk)
+        parts.append(part | _solve_reactions(mech, motion, state, chunk) if reactions else part)
         if progress is not None:
             progress(chunk.stop, total)
     values = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
-    # Simpson's rule through the states that have a power; before the first gap only.
-    power = values["actuator_power"]
-    known = int(np.argmax(~np.isfinite(power))) if not np.isfinite(power).all() else total
-    values["actuator_work"] = np.full(total, np.nan)
-    if known > 2:
-        values["actuator_work"][:known] = cumulative_simpson(
-            power[:known], x=motion.time[:known], initial=0.0
-        )
+    values["actuator_work"] = work_of(motion.time, values["actuator_power"])
     determinant = Determinant(values["determinant"], values["determinant_rate"], values["status"])
     passages = find_passages(mech, motion, state.pose, determinant)
-    dataset = _dataset(mech, motion, values)
+    attrs: dict[str, str | int] = {
+        "title": f"{mech.name} along {motion.name}",
+        "motion": motion.name,
+        "coordinate_set": motion.set,
+        "branch": motion.branch,
+        "wrench_axes": mech.geometry["load"]["axes"] if motion.wrench is None else motion.wrench_axes,
+    }
+    dataset = dataset_of(mech, motion.time, values, attrs)
     return Solution(dataset.assign_attrs(singularities=json.dumps(passages, ensure_ascii=False)))
+
+
+def states_along(mech: Mechanism, motion: Motion) -> State:
+    """Pose, twist and acceleration of the platform at the times of a motion."""
+    return mech.state(
+        motion.coordinates, motion.rates, motion.second_rates, branch=motion.branch, continued=True
+    )
 
 
 def _solve_chunk(mech: Mechanism, motion: Motion, state: State, chunk: slice) -> dict[str, NDArray[Any]]:
     """All variables of some states."""
-    pose, twist, acceleration = state.pose[chunk], state.twist[chunk], state.acceleration[chunk]
+
+    def of(part: Any) -> Any:
+        return {name: of(column) for name, column in part.items()} if isinstance(part, dict) else part[chunk]
+
+    wrench = None if motion.wrench is None else motion.wrench[chunk]
+    return variables_of(mech, State(*map(of, state)), wrench, motion.wrench_axes)
+
+
+def work_of(time: Array, power: Array) -> Array:
+    """Work since the start (N,), J, by Simpson's rule through the states before the first without a power."""
+    work = np.full(len(time), np.nan)
+    known = len(time) if np.isfinite(power).all() else int(np.argmax(~np.isfinite(power)))
+    if known > 2:
+        work[:known] = cumulative_simpson(power[:known], x=time[:known], initial=0.0)
+    return work
+
+
+def variables_of(
+    mech: Mechanism, state: State, wrench: Array | None, wrench_axes: str
+) -> dict[str, NDArray[Any]]:
+    """The variables of a solution at states (N,) under a load (N, 6), the mechanism's own for None."""
+    pose, twist, acceleration = state.pose, state.twist, state.acceleration
     legs = mech.inverse_kinematics(pose)
     kin = mech.kinematics(pose, twist, acceleration)
-    wrench = None if motion.wrench is None else motion.wrench[chunk]
     own = mech.geometry["load"]
     loads = np.broadcast_to([*own["force"], *own["torque"]], twist.shape) if wrench is None else wrench
-    load = (wrench, motion.wrench_axes)
+    load = (wrench, wrench_axes)
     dynamics = mech.inverse_dynamics(pose, twist, acceleration, *load)
     power = mech.power(pose, twist, acceleration, *load)
     conditioning, determinant = mech.conditioning(pose), mech.determinant(pose, twist)
     limits = mech.limits(pose, *load, twist=twist, acceleration=acceleration)
     # The first thing that went wrong explains the rest.
-    found = state.status[chunk]
-    status = np.where(found != Status.OK, found, dynamics.status)
+    status = np.where(state.status != Status.OK, state.status, dynamics.status)
     values: dict[str, NDArray[Any]] = {
         "pose": pose,
         "twist": twist,
@@ -205,11 +249,29 @@ def _solve_chunk(mech: Mechanism, motion: Motion, state: State, chunk: slice) ->
         ("coordinate_rate_", state.coordinate_rates),
         ("coordinate_second_rate_", state.coordinate_second_rates),
     ):
-        values |= {prefix + name: column[chunk] for name, column in series.items()}
+        values |= {prefix + name: column for name, column in series.items()}
     return values
 
 
-def _dataset(mech: Mechanism, motion: Motion, values: dict[str, NDArray[Any]]) -> xr.Dataset:
+def _solve_reactions(mech: Mechanism, motion: Motion, state: State, chunk: slice) -> dict[str, NDArray[Any]]:
+    """The reactions of all joints at some states."""
+    wrench = None if motion.wrench is None else motion.wrench[chunk]
+    answer = mech.joint_reactions(
+        state.pose[chunk], state.twist[chunk], state.acceleration[chunk], wrench, motion.wrench_axes
+    )
+    return {
+        "reaction": answer.reactions,
+        "reaction_in_joint": answer.reactions_in_joint,
+        "least_reaction": answer.least,
+        "least_reaction_in_joint": answer.least_in_joint,
+        "reaction_determinate": answer.determinate_in_joint.astype(np.int8),
+        "constraint_wrench": answer.constraint_wrench,
+    }
+
+
+def dataset_of(
+    mech: Mechanism, time: Array, values: dict[str, NDArray[Any]], attrs: dict[str, str | int]
+) -> xr.Dataset:
     """The variables with their dimensions, units, names and the inputs that they came from."""
     data: dict[str, Any] = {}
     for name, array in values.items():
@@ -224,11 +286,13 @@ def _dataset(mech: Mechanism, motion: Motion, values: dict[str, NDArray[Any]]) -
     mobility = mech.mobility()
     rows = [mobility.constraint_rows[i] for i in mobility.independent_rows]
     coords: dict[str, Any] = {
-        "time": (_TIME, motion.time, {"units": "s", "symbol": "t", "long_name": "time"}),
+        "time": (_TIME, time, {"units": "s", "symbol": "t", "long_name": "time"}),
         "leg": list(mech.leg_names),
         "axis": ["x", "y", "z"],
         "component": ["linear x", "linear y", "linear z", "angular x", "angular y", "angular z"],
         "joint_axis": ["body", "leg"],
+        "joint": [joint.name for joint in mech.joint_list],
+        "joint_component": ["force 1", "force 2", "force 3", "torque 1", "torque 2", "torque 3"],
         "row": [0, 1, 2, 3],
         "column": [0, 1, 2, 3],
         "rod": list(mech.rod_names),
@@ -239,19 +303,14 @@ def _dataset(mech: Mechanism, motion: Motion, values: dict[str, NDArray[Any]]) -
     if mech.coupled_legs:
         coords["coupled_leg"] = list(mech.coupled_legs)
     coords = {name: value for name, value in coords.items() if _used(name, value, data)}
-    attrs: dict[str, str | int] = {
-        "title": f"{mech.name} along {motion.name}",
+    source = {
         "mechanism": mech.name,
         "mechanism_file": mech.to_toml(),
-        "motion": motion.name,
-        "coordinate_set": motion.set,
-        "branch": motion.branch,
-        "wrench_axes": mech.geometry["load"]["axes"] if motion.wrench is None else motion.wrench_axes,
         "polypod_version": _core.__version__,
     }
     # A mechanism without rods or constraints has no such variables.
     data = {name: variable for name, variable in data.items() if 0 not in variable[1].shape[1:]}
-    return xr.Dataset(data, coords, attrs)
+    return xr.Dataset(data, coords, {**attrs, **source})
 
 
 def _used(name: str, value: Any, data: dict[str, Any]) -> bool:

@@ -21,13 +21,13 @@ pub fn load_in_base<T: Real>(wrench: Wrench<T>, axes: Axes, pose: &Pose<T>) -> W
 /// Weight and inertial force of a link with the acceleration `a` of its mass centre [Eq. 40] \[T13\]:
 /// `G + f = m (g - a)`.
 #[inline(always)]
-fn inertial_force<T: Real>(body: &Body, gravity: Vec3<T>, a: Vec3<T>) -> Vec3<T> {
+pub(crate) fn inertial_force<T: Real>(body: &Body, gravity: Vec3<T>, a: Vec3<T>) -> Vec3<T> {
     (gravity - a) * T::lit(body.mass)
 }
 
 /// Inertial torque `t = -(I ε + ω × I ω)` with the inertia turned into base axes [Eq. 40, completed] \[T13\].
 #[inline(always)]
-fn inertial_torque<T: Real>(body: &Body, axes: Mat3<T>, omega: Vec3<T>, eps: Vec3<T>) -> Vec3<T> {
+pub(crate) fn inertial_torque<T: Real>(body: &Body, axes: Mat3<T>, omega: Vec3<T>, eps: Vec3<T>) -> Vec3<T> {
     let inertia = Mat3::lift(body.inertia);
     let (omega, eps) = (axes.transpose_mul(omega), axes.transpose_mul(eps));
     -(axes * (inertia * eps + omega.cross(inertia * omega)))
@@ -42,10 +42,13 @@ pub fn platform_wrench<T: Real>(mech: &Mechanism, platform: &Motion<T>) -> Wrenc
     let a = acceleration.a + acceleration.eps.cross(center) + twist.omega.cross(twist.omega.cross(center));
     let force = inertial_force(body, Vec3::lift(mech.gravity), a);
     let torque = inertial_torque(body, pose.rotation, twist.omega, acceleration.eps);
-    // f_d = -μ v, t_d = -μ ω
-    let damping =
-        Wrench::new(-(twist.v * T::lit(mech.linear_damping)), -(twist.omega * T::lit(mech.angular_damping)));
-    Wrench::at(center, force) + Wrench::new(Vec3::zero(), torque) + damping
+    Wrench::at(center, force) + Wrench::new(Vec3::zero(), torque) + damping_wrench(mech, twist)
+}
+
+/// The platform's damping, a part of [Eq. 42]: `f_d = -μ v, t_d = -μ ω`.
+#[inline(always)]
+pub fn damping_wrench<T: Real>(mech: &Mechanism, twist: &Twist<T>) -> Wrench<T> {
+    Wrench::new(-(twist.v * T::lit(mech.linear_damping)), -(twist.omega * T::lit(mech.angular_damping)))
 }
 
 /// Cylinder, piston and the rods that the leg leads, carried to the platform \[T14\].
@@ -70,9 +73,15 @@ fn leg_wrench<T: Real>(mech: &Mechanism, index: usize, leg: &Leg, platform: &Mot
     wrench
 }
 
-/// Torque of the rod's weight and inertia about its line, in the rod's axes (L, n, L×n) [Eq. 36, 42].
+/// Torque of the rod's weight and inertia about its line [Eq. 36, 42].
 #[inline(always)]
 fn rod_torque<T: Real>(mech: &Mechanism, rod: &Rod, leader: &leg::State<T>) -> T {
+    Vec3::lift(rod.axis).dot(rod_wrench(mech, rod, leader).torque)
+}
+
+/// The rod's weight and inertia as a wrench at its point, from its turn and its axes (L, n, L×n) [Eq. 36, 42].
+#[inline(always)]
+pub(crate) fn rod_wrench<T: Real>(mech: &Mechanism, rod: &Rod, leader: &leg::State<T>) -> Wrench<T> {
     let (axis, n) = (Vec3::lift(rod.axis), leader.frame.n());
     let turn = leg::rod_turn(axis, leader);
     let (omega, eps) = (axis * turn.rate, axis * turn.acceleration);
@@ -80,7 +89,7 @@ fn rod_torque<T: Real>(mech: &Mechanism, rod: &Rod, leader: &leg::State<T>) -> T
     let center = axes * Vec3::lift(rod.body.center);
     let a = eps.cross(center) + omega.cross(omega.cross(center));
     let force = inertial_force(&rod.body, Vec3::lift(mech.gravity), a);
-    axis.dot(center.cross(force) + inertial_torque(&rod.body, axes, omega, eps))
+    Wrench::new(force, center.cross(force) + inertial_torque(&rod.body, axes, omega, eps))
 }
 
 /// All that the actuators and constraints must balance, as a wrench at o: the braces of [Eq. 43]. The paper's

@@ -5,6 +5,7 @@
 
 pub mod assembly;
 pub mod batch;
+pub mod chart;
 pub mod clearance;
 pub mod complex;
 pub mod constraint;
@@ -12,6 +13,7 @@ pub mod coordinates;
 mod draw;
 pub mod dynamics;
 pub mod forward;
+pub mod forward_dynamics;
 pub mod forward_lanes;
 pub mod jacobian;
 pub mod joints;
@@ -27,6 +29,7 @@ pub mod nearest;
 pub mod paths;
 pub mod quadratic;
 pub mod reach;
+pub mod reactions;
 pub mod real;
 pub mod roots;
 pub mod singularity;

@@ -428,6 +428,13 @@ impl<T: Real> Wrench<T> {
         Wrench::new(force, e.cross(force))
     }
 
+    /// The same wrench, its torque about a point that is `back` behind the point it is given at.
+    #[must_use]
+    #[inline(always)]
+    pub fn moved(self, back: Vec3<T>) -> Self {
+        Wrench::new(self.force, self.torque + back.cross(self.force))
+    }
+
     #[inline(always)]
     pub fn power(self, twist: &Twist<T>) -> T {
         self.force.dot(twist.v) + self.torque.dot(twist.omega)
@@ -439,6 +446,14 @@ impl<T: Real> Add for Wrench<T> {
     #[inline(always)]
     fn add(self, b: Self) -> Self {
         Wrench::new(self.force + b.force, self.torque + b.torque)
+    }
+}
+
+impl<T: Real> Sub for Wrench<T> {
+    type Output = Self;
+    #[inline(always)]
+    fn sub(self, b: Self) -> Self {
+        Wrench::new(self.force - b.force, self.torque - b.torque)
     }
 }
 

@@ -3,18 +3,20 @@
 // Arguments arrive from Python by value.
 #![allow(clippy::needless_pass_by_value)]
 
+mod simulation;
 mod workspace;
 
 use std::sync::OnceLock;
 
 use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray1};
 use polypod_core::assembly::assemble;
-use polypod_core::batch::{self, Coordinates, Loads, States, Table};
+use polypod_core::batch::{self, Coordinates, Loads, Space, States, Table};
 use polypod_core::coordinates::Set;
 use polypod_core::limits::Limit;
 use polypod_core::mechanism::Mechanism;
 use polypod_core::modes::{self, Start};
 use polypod_core::nearest::Search;
+use polypod_core::reactions;
 use polypod_core::roots::{self, Node, Precision};
 use polypod_core::singularity::Kind;
 use polypod_core::spec::{Axes, Fault, Spec};
@@ -63,6 +65,7 @@ fn arrays(py: Python<'_>, table: Table) -> PyResult<Bound<'_, PyDict>> {
 }
 
 type LimitRow = (String, &'static str, Vec<usize>, &'static str, f64, f64, f64);
+type JointRow = (String, &'static str, [String; 2]);
 type AllModes<'py> = (Bound<'py, PyDict>, Vec<usize>, Bound<'py, PyArray1<u8>>);
 
 type CoordinateSet = (&'static str, Vec<&'static str>, Option<Vec<bool>>);
@@ -307,6 +310,49 @@ impl PyMechanism {
         self.loaded(py, motion, wrenches.as_ref(), platform_axes, batch::inverse_dynamics)
     }
 
+    #[pyo3(signature = (poses, twists, forces, wrenches, platform_axes))]
+    fn forward_dynamics<'py>(
+        &self,
+        py: Python<'py>,
+        poses: Array<'py>,
+        twists: Array<'py>,
+        forces: Array<'py>,
+        wrenches: Option<Array<'py>>,
+        platform_axes: bool,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        let (poses, twists, forces) = (slice(&poses)?, slice(&twists)?, slice(&forces)?);
+        expect(twists, 6, poses)?;
+        expect(forces, self.0.legs.len(), poses)?;
+        let loads = loads(wrenches.as_ref(), platform_axes, poses)?;
+        let table = py.detach(|| batch::forward_dynamics(&self.0, poses, twists, forces, &loads));
+        arrays(py, table)
+    }
+
+    /// In platform space, or in coordinates of a set: their names, those of the set that are given, and the arrays.
+    #[pyo3(signature = (poses, twists, set, names))]
+    fn equations_of_motion<'py>(
+        &self,
+        py: Python<'py>,
+        poses: Array<'py>,
+        twists: Array<'py>,
+        set: Option<&str>,
+        names: Option<Vec<String>>,
+    ) -> PyResult<(Vec<&'static str>, Bound<'py, PyDict>)> {
+        let (poses, twists) = (slice(&poses)?, slice(&twists)?);
+        expect(twists, 6, poses)?;
+        let (space, names) = match set {
+            None => (Space::Platform, vec![]),
+            Some(set) => {
+                let set = self.set(set)?;
+                let given = batch::searched_coordinates(&self.0, &set, names.as_deref());
+                let names = set.names().iter().zip(&given).filter(|(_, g)| **g).map(|(n, _)| *n).collect();
+                (Space::Coordinates(Box::new(set), given), names)
+            }
+        };
+        let table = py.detach(|| batch::equations_of_motion(&self.0, poses, twists, &space));
+        Ok((names, arrays(py, table)?))
+    }
+
     #[pyo3(signature = (poses, twists, accelerations, wrenches, platform_axes))]
     fn power<'py>(
         &self,
@@ -333,6 +379,29 @@ impl PyMechanism {
     ) -> PyResult<Bound<'py, PyDict>> {
         let motion = [&poses, &twists, &accelerations];
         self.loaded(py, motion, wrenches.as_ref(), platform_axes, batch::limits)
+    }
+
+    #[pyo3(signature = (poses, twists, accelerations, wrenches, platform_axes, length))]
+    #[allow(clippy::too_many_arguments)]
+    fn joint_reactions<'py>(
+        &self,
+        py: Python<'py>,
+        poses: Array<'py>,
+        twists: Array<'py>,
+        accelerations: Array<'py>,
+        wrenches: Option<Array<'py>>,
+        platform_axes: bool,
+        length: f64,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        let states = states(&poses, &twists, &accelerations)?;
+        let loads = loads(wrenches.as_ref(), platform_axes, states.poses)?;
+        let table = py.detach(|| batch::joint_reactions(&self.0, &states, &loads, length));
+        arrays(py, table)
+    }
+
+    /// Name, kind and links (towards the base, away from it) of each joint.
+    fn joint_list(&self) -> Vec<JointRow> {
+        reactions::joints(&self.0).into_iter().map(|j| (j.name, j.kind, j.links)).collect()
     }
 
     /// Name, kind, legs (from 0), unit, least and greatest value (infinite where there is none) and scale of each limit.
@@ -483,6 +552,7 @@ fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add("Faults", m.py().get_type::<Faults>())?;
     m.add_class::<PyMechanism>()?;
     m.add_function(wrap_pyfunction!(workspace::fit_poses, m)?)?;
+    m.add_class::<simulation::PyChart>()?;
     m.add_class::<workspace::PyFlood>()?;
     m.add_class::<workspace::PyLattice>()?;
     m.add_function(wrap_pyfunction!(zeros, m)?)?;

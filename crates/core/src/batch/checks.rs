@@ -16,7 +16,7 @@ pub(super) const ROTATION_TOLERANCE: f64 = 1e-6;
 pub const CONSTRAINT_TOLERANCE: f64 = 1e-6;
 
 /// Pivot ratio of the scaled Jacobian below which it is singular to working precision.
-pub(super) const SINGULAR_PIVOTS: f64 = 1e-12;
+pub const SINGULAR_PIVOTS: f64 = 1e-12;
 
 /// Sine of the angle between a leg and the axis of its universal joint, and length of a leg relative to the
 /// characteristic length, below which the leg has no frame.
