@@ -495,7 +495,10 @@ def test_command_without_the_engine(run, monkeypatch):
     monkeypatch.setattr(table, "find_spec", lambda module: None)
     status, out, err = run("verify", LU, LU)
     assert (status, out) == (2, "")
-    assert err == "polypod: Pinocchio is not installed; install it with: pip install polypod[verify]\n"
+    assert err == (
+        "polypod: Pinocchio is not installed; install it with: pip install pin, "
+        "or all engines with: pip install polypod[verify]\n"
+    )
 
 
 def test_command_with_an_unknown_engine(run):

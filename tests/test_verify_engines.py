@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import sys
 from pathlib import Path
 
@@ -20,6 +21,7 @@ pytest.importorskip("mujoco")
 
 sys.path.insert(0, str(Path(__file__).parent))
 import test_oracle as cases
+from polypod.verify import exudyn as hard
 from polypod.verify import mujoco as soft
 
 COLUMNS = 120
@@ -111,7 +113,7 @@ def test_paper_s_mechanism(engine):
         assert row.approximate == (row.quantity != "freedoms")
         assert row.tolerance == (table.ENGINES[engine].approximate if row.approximate else found.tolerance)
     (note,) = found.comparisons[0].notes
-    assert ("Released" in note) == (engine == "exudyn")
+    assert note.startswith({"exudyn": "Released", "mujoco": "Soft loops"}[engine])
 
 
 @pytest.mark.parametrize("engine", ENGINES)
@@ -135,19 +137,99 @@ def agrees_on(name, engine, every):
     assert found.agrees, exceeding(found)
 
 
-def test_mujoco_s_own_loops_are_far_off():
-    """The default is worse than the stiff, and the stiff worse than what is compared."""
-    mech, (pose, twist, acceleration) = lu_states([1.3])
+def every_link(mech):
+    return [(i, link) for i in range(len(mech.leg_names)) for link in ("cylinder", "piston")]
+
+
+def without_masses(mech, links):
+    """The same mechanism, some of its legs' links without mass."""
+    tables = mech.to_dict()
+    for leg, link in links:
+        del tables["legs"][leg][link]
+    return pp.Mechanism.from_dict(tables)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("some", ["all", "one piston"])
+@pytest.mark.parametrize("name", ["6-sps", "6-ups", "rod-lined"])
+def test_legs_without_mass(name, some, engine):
+    """Also those that spin freely, which nothing but rounding turns about their axes."""
+    case = cases.case(name)
+    mech = without_masses(case.mech, every_link(case.mech) if some == "all" else [(0, "piston")])
+    found = verify_states(mech, *(a[::9] for a in (case.T, case.twist, case.acceleration)), engines=[engine])
+    assert found.agrees, (found.comparisons[0].without_answer, exceeding(found))
+
+
+def test_a_system_that_exudyn_finds_singular_has_no_answer(monkeypatch, capfd):
+    """It goes on with accelerations of zero and a warning."""
+    case = cases.case("6-sps")
+    mech = without_masses(case.mech, every_link(case.mech))
+    monkeypatch.setattr(hard, "inertial", lambda tree, body: (body.mass, body.inertia))
+    states = (a[:1] for a in (case.T, case.twist, case.acceleration))
+    found = verify_states(mech, *states, engines=["exudyn"]).comparisons[0]
+    assert found.without_answer == {"Exudyn: SINGULAR": 1}
+    assert capfd.readouterr() == ("", "")
+
+
+def quoted_gaps(found):
+    """What the notes say of MuJoCo's soft loops: with its defaults, and with the stiffest."""
+    (note,) = found.comparisons[0].notes
+    match = re.search(r"off by up to (\S+) of .* default .* by (\S+) with the stiffest", note)
+    return tuple(map(float, match.groups()))
+
+
+@pytest.mark.parametrize("name", [LU, "ups-hexapod"])
+def test_mujoco_s_own_loops_are_far_off(name):
+    """The default is worse than the stiff, the stiff worse than what is compared, and the report says so."""
+    if name == LU:
+        mech, states = lu_states([1.3])
+    else:
+        mech = pp.load(cases.DATA / f"{name}.toml")
+        states = mech.home[None], np.full((1, 6), 0.3), np.full((1, 6), 0.5)
+    found = verify_states(mech, *states, engines=["mujoco"])
+    default, stiff = quoted_gaps(found)
+    assert default > 10 * stiff > 1e-4
+    assert default > 0.02
+    assert found.agrees
+    pose, twist, acceleration = (a[0] for a in states)
     twin = soft.Twin(describe(mech))
-    forces = mech.inverse_dynamics(pose, twist, acceleration).forces[0]
-    own = mech.geometry["load"]
-    start = twin.links.start(pose[0], twist[0])
-    wrench = np.array([*own["force"], *own["torque"]])
-    default, stiff, passes = (
-        np.abs(model.accelerations(start, twist[0], wrench, forces)[PLATFORM] - acceleration[0]).max()
-        for model in twin.models
-    )
-    assert default > 10.0 > 1.0 > stiff > 1e-3 > 1e-6 > passes
+    own, gravity = mech.geometry["load"], np.linalg.norm(mech.geometry["gravity"])
+    forces = mech.inverse_dynamics(*states).forces[0]
+    state = (twin.links.start(pose, twist), twist, np.array([*own["force"], *own["torque"]]), forces)
+    size = np.linalg.norm(acceleration[:3]) + gravity
+    for model, gap in ((twin.soft["default"], default), (twin.soft["stiff"], stiff)):
+        platform = next(model.passes(*state))[twin.numbers[PLATFORM], :3]
+        assert np.linalg.norm(platform - acceleration[:3]) / size == pytest.approx(gap, rel=0.06)
+
+
+def nearly_dependent(tilt):
+    """Two UPU legs with parallel axes, at an angle: each forbids turns about its direction."""
+    tables = pp.load(cases.DATA / "stewart-gough.toml").to_dict()
+    tables["legs"] = tables["legs"][:4]
+    joint = {"joint": "U", "axis": [1.0, 0.0, 0.0]}
+    for leg, x, y in zip(tables["legs"], (-400.0, 400.0), (0.0, 600.0 * tilt), strict=False):
+        leg["base"] = joint | {"point": [x, y, 0.0]}
+        leg["platform"] = joint | {"point": [x, 0.0, 0.0]}
+    del tables["published"]
+    return pp.Mechanism.from_dict(tables)
+
+
+@pytest.mark.parametrize(("tilt", "converges"), [(0.1, True), (1e-3, False)])
+def test_passes_converge_or_say_that_they_do_not(tilt, converges):
+    """Constraints that depend on one another, but for a little, converge slowly."""
+    mech = nearly_dependent(tilt)
+    rest = np.zeros((1, 6))
+    found = verify_states(mech, mech.home[None], rest, rest, engines=["mujoco"])
+    assert found.agrees == converges
+    assert found.comparisons[0].without_answer == ({} if converges else {"MuJoCo: NOT_CONVERGED": 1})
+    assert len(found.comparisons[0].notes) == converges
+
+
+def test_as_many_passes_as_it_takes(monkeypatch):
+    mech, states = lu_states([1.3])
+    monkeypatch.setattr(soft, "PASSES", 3)
+    found = verify_states(mech, *states, engines=["mujoco"]).comparisons[0]
+    assert found.without_answer == {"MuJoCo: NOT_CONVERGED": 1}
 
 
 @pytest.mark.parametrize("engine", ENGINES)
@@ -310,4 +392,5 @@ def test_command_without_the_engine(run, monkeypatch, engine, title):
     monkeypatch.setattr(table, "find_spec", lambda module: None)
     status, out, err = run("verify", LU, LU, "--engine", engine)
     assert (status, out) == (2, "")
-    assert err == f"polypod: {title} is not installed; install it with: pip install polypod[verify]\n"
+    install = f"pip install {engine}, or all engines with: pip install polypod[verify]"
+    assert err == f"polypod: {title} is not installed; install it with: {install}\n"

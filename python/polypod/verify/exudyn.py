@@ -17,9 +17,10 @@ from exudyn.rigidBodyUtilities import AngularVelocity2EulerParameters_t, Rotatio
 from numpy.typing import NDArray
 
 from polypod.status import Status
+from polypod.verify.forced import Forced, inertial
 from polypod.verify.placement import BASE, PLATFORM, Placements, across, cross
-from polypod.verify.rows import Links, Row, Slide, Start
-from polypod.verify.tree import POINT, Multibody
+from polypod.verify.rows import Row, Slide, Start
+from polypod.verify.tree import POINT, Body, Multibody
 
 Array = NDArray[np.float64]
 Drive = Callable[[float], tuple[Array, Array]]
@@ -27,23 +28,25 @@ Drive = Callable[[float], tuple[Array, Array]]
 
 NEWTON = 1e-10
 """Relative and absolute tolerance of the integrator's Newton iteration."""
-WIDTH = 2e-5
-"""Of Exudyn's numerical differences at the start, relative."""
+WIDTH = float(np.cbrt(np.finfo(np.float64).eps))
+"""Of Exudyn's differences at the start, m and Euler parameters: the cube root of rounding, where the error
+that two widths leave, of second order, is as large as rounding over the width."""
 SPECTRAL_RADIUS = 0.9
 """Of the generalised-alpha integrator at infinite frequency: it damps what the constraints excite."""
 
+# What it prints would stand among what a command prints; failures are told by status.
+exudyn.config.printToConsole = False
 _OUTPUT = exudyn.OutputVariableType
 _NOW = exudyn.ConfigurationType.Current
 
 
-class Twin:
+class Twin(Forced):
     """The mechanism's links and constraints; an Exudyn system is made from them for each start."""
 
     version: str = exudyn.__version__
 
     def __init__(self, tree: Multibody) -> None:
-        self.tree = tree
-        self.links = Links(tree)
+        super().__init__(tree)
         self.centers = {body.name: body.center for body in tree.bodies} | {BASE: POINT}
         self._released: dict[str, None] = {}
 
@@ -53,39 +56,11 @@ class Twin:
             return []
         return [f"Released, because other constraints say the same: {'; '.join(self._released)}."]
 
-    def answer(
-        self, pose: Array, twist: Array, wrench: Array, forces: Array
-    ) -> tuple[dict[str, Any], Status]:
-        """Accelerations at one state under the forces given, SI, base axes; and what became of it.
-
-        Args:
-            pose: (4, 4).
-            twist: (6,).
-            wrench: (6,), load at o in base axes.
-            forces: (legs,), of the prismatic joints.
-        """
-        if not all(np.isfinite(a).all() for a in (pose, twist, wrench, forces)):
-            return {}, Status.INVALID_INPUT
-        start = self.links.start(pose, twist)
-        found: dict[str, Any] = {"closure": start.closure}
-        if start.status is not Status.OK:
-            return found, start.status
+    def accelerations(self, start: Start, twist: Array, wrench: Array, forces: Array) -> Array | Status:
+        """`Forced.accelerations`; SINGULAR where Exudyn cannot solve for them."""
         self._released |= dict.fromkeys(self.links.words(start.redundant))
-        system = System(self, start, lambda t: (forces, wrench))
-        moved = system.accelerations()
-        if moved is None:
-            return found, Status.SINGULAR
-        legs, none = self.tree.legs, np.zeros((0, 3))
-        found |= {
-            "freedoms": start.freedoms,
-            "platform_acceleration": moved[PLATFORM][0],
-            "platform_eps": moved[PLATFORM][1],
-            "leg_eps": np.array([moved[leg.cylinder][1] for leg in legs]),
-            "piston_acceleration": np.array([moved[leg.piston][0] for leg in legs]),
-            "cylinder_acceleration": np.array([moved[leg.cylinder][0] for leg in legs]),
-            "rod_eps": np.array([moved[rod][1] for rod in self.tree.rods]) if self.tree.rods else none,
-        }
-        return found, Status.OK
+        found = System(self, start, lambda t: (forces, wrench)).accelerations()
+        return Status.SINGULAR if found is None else found
 
     def follow(
         self, pose: Array, twist: Array, drive: Drive, duration: float, steps: int, every: int
@@ -125,31 +100,31 @@ class System:
         self.mbs = self._container.AddSystem()
         self._number = {BASE: self.mbs.AddObject(items.ObjectGround())}
         for body, twist in zip(self.tree.bodies, start.twists, strict=True):
-            # The efficiency divides the platform's own term alone [T15].
-            share = 1.0 / self.tree.geometry["efficiency"] if body.name == PLATFORM else 1.0
-            inertia = share * body.inertia
-            self._link(body.name, start.placements[body.name], twist, share * body.mass, inertia)
+            self._link(body, start.placements[body.name], twist)
         for i in np.setdiff1d(np.arange(len(twin.links.rows)), start.redundant):
             self._constrain(twin.links.rows[i])
         self._load(drive)
         self.mbs.Assemble()
+        acting = (start.twists, self.tree.geometry["gravity"], *drive(0.0))
+        self._idle = not any(np.any(a) for a in acting)
 
     # --- making it ---------------------------------------------------------------------------------------
 
-    def _link(self, name: str, frame: Array, twist: Array, mass: float, inertia: Array) -> None:
+    def _link(self, link: Body, frame: Array, twist: Array) -> None:
         """A rigid body with its node at the mass centre, and its weight."""
-        turn, arm = frame[:3, :3], frame[:3, :3] @ self.twin.centers[name]
+        turn, arm = frame[:3, :3], frame[:3, :3] @ link.center
         parameters = RotationMatrix2EulerParameters(turn)
         rates = AngularVelocity2EulerParameters_t(twist[3:], parameters)
         node = items.NodeRigidBodyEP(
             referenceCoordinates=[*(frame[:3, 3] + arm), *parameters],
             initialVelocities=[*(twist[:3] + cross(twist[3:], arm)), *rates],
         )
+        mass, inertia = inertial(self.tree, link)
         # Diagonal, then yz, xz, xy.
         six = [*np.diag(inertia), inertia[1, 2], inertia[0, 2], inertia[0, 1]]
         body = items.ObjectRigidBody(nodeNumber=self.mbs.AddNode(node), mass=mass, inertia=six)
-        self._number[name] = self.mbs.AddObject(body)
-        marker = self.mbs.AddMarker(items.MarkerBodyMass(bodyNumber=self._number[name]))
+        self._number[link.name] = self.mbs.AddObject(body)
+        marker = self.mbs.AddMarker(items.MarkerBodyMass(bodyNumber=self._number[link.name]))
         gravity = list(self.tree.geometry["gravity"])
         self.mbs.AddLoad(items.LoadMassProportional(markerNumber=marker, loadVector=gravity))
 
@@ -209,38 +184,38 @@ class System:
 
     # --- using it ----------------------------------------------------------------------------------------
 
-    def accelerations(self) -> dict[str, tuple[Array, Array]] | None:
-        """Of each body at the start: (3,) of its mass centre, of o for the platform; (3,) angular.
+    def accelerations(self) -> Array | None:
+        """(bodies, 6) at the start, as `Forced.accelerations`.
 
         Exudyn takes the constraints' second rates as one-sided differences, with an error proportional to
         their width: two widths give it away.
         """
-        wide, narrow = (self._initial(width) for width in (2.0 * WIDTH, WIDTH))
-        if wide is None or narrow is None:
-            return None
-        return {
-            name: (2.0 * narrow[name][0] - wide[name][0], 2.0 * narrow[name][1] - wide[name][1])
-            for name in narrow
-        }
+        wide, narrow = (self._initial(width) for width in (WIDTH, 0.5 * WIDTH))
+        return None if wide is None or narrow is None else 2.0 * narrow - wide
 
-    def _initial(self, width: float) -> dict[str, tuple[Array, Array]] | None:
+    def _initial(self, width: float) -> Array | None:
         """The accelerations that go with forces and constraints, which Exudyn finds before its first step."""
         solver: Any = exudyn.MainSolverImplicitSecondOrder()
         settings = _settings(1e-6, 1)
-        settings.timeIntegration.newton.numericalDifferentiation.relativeEpsilon = width
+        differences = settings.timeIntegration.newton.numericalDifferentiation
+        # Relative to a coordinate's change, none at the start, or to this size where that is greater.
+        differences.relativeEpsilon = width / differences.minimumCoordinateSize
         if not solver.InitializeSolver(self.mbs, settings):
             return None
-        found = {name: self._acceleration(name) for name in self.twin.links.bodies}
+        found = np.array([self._acceleration(name) for name in self.twin.links.bodies])
+        moves = np.any(self.mbs.systemData.GetODE2Coordinates_tt())
         solver.FinalizeSolver(self.mbs, settings)
-        return found if all(np.isfinite(a).all() for pair in found.values() for a in pair) else None
+        # Where it finds the system singular, Exudyn warns and takes zeros.
+        return found if np.isfinite(found).all() and (moves or self._idle) else None
 
-    def _acceleration(self, name: str) -> tuple[Array, Array]:
+    def _acceleration(self, name: str) -> Array:
         point = -self.twin.centers[name] if name == PLATFORM else POINT
-        linear, angular = (
-            np.asarray(self.mbs.GetObjectOutputBody(self._number[name], kind, point, _NOW))
-            for kind in (_OUTPUT.Acceleration, _OUTPUT.AngularAcceleration)
+        return np.concatenate(
+            [
+                self.mbs.GetObjectOutputBody(self._number[name], kind, point, _NOW)
+                for kind in (_OUTPUT.Acceleration, _OUTPUT.AngularAcceleration)
+            ]
         )
-        return linear, angular
 
     def run(self, duration: float, steps: int, every: int) -> Track | None:
         """`Twin.follow` of this system."""

@@ -17,8 +17,9 @@ from numpy.typing import NDArray
 from polypod.errors import PolypodError
 from polypod.mechanism import Mechanism
 from polypod.motion import Motion
+from polypod.solution import states_along
 from polypod.status import Status
-from polypod.verify.table import engine_class
+from polypod.verify.table import engine_class, load_at_o
 from polypod.verify.tree import describe
 
 Array = NDArray[np.float64]
@@ -142,8 +143,8 @@ def _run(
     """Errors (records, 6 + legs) of position, rotation and lengths, of the joints, and what was released."""
     # Also half steps, which an integrator may ask for.
     path = motion.sample(np.linspace(start, end, 2 * steps + 1))
-    state = mech.state(path.coordinates, path.rates, path.second_rates, branch=path.branch, continued=True)
-    load = _load(mech, path, state.pose)
+    state = states_along(mech, path)
+    load = load_at_o(mech.geometry, state.pose, path.wrench, path.wrench_axes)
     answer = mech.inverse_dynamics(state.pose, state.twist, state.acceleration, load, "base")
     answered = np.isin(answer.status, [int(s) for s in Status if s.has_answer])
     if not answered.all():
@@ -168,16 +169,6 @@ def _run(
     ]
     placed = twin.links.start(state.pose[0], state.twist[0])
     return np.concatenate(errors, axis=1), track.closure, twin.links.words(placed.redundant)
-
-
-def _load(mech: Mechanism, path: Motion, pose: Array) -> Array:
-    """(N, 6): the load at o in base axes; the mechanism's own where the motion has none."""
-    wrench, axes = path.wrench, path.wrench_axes
-    if wrench is None:
-        own = mech.geometry["load"]
-        wrench, axes = np.array([*own["force"], *own["torque"]]), own["axes"]
-    load = np.broadcast_to(wrench, (len(pose), 6)).reshape(-1, 2, 3)
-    return (np.einsum("nij,nkj->nki", pose[:, :3, :3], load) if axes == "platform" else load).reshape(-1, 6)
 
 
 def _turns(rotation: Array) -> Array:

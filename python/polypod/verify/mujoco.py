@@ -2,12 +2,15 @@
 
 MuJoCo lets every constraint give way by a part 1 - d of what it should hold, with an impedance d of at most
 0.9999. That is applied in passes here: the loops' forces of one are given as forces to the next, so that only
-what is left gives way. Its inverse dynamics takes loops' forces from how far they gave way, and is not used.
+what is left gives way, until accelerations stay the same. Its inverse dynamics takes loops' forces from how
+far they gave way, and is not used.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from itertools import islice, pairwise
 from typing import Any
 from xml.etree import ElementTree
 
@@ -16,20 +19,28 @@ import numpy as np
 from numpy.typing import NDArray
 
 from polypod.status import Status
+from polypod.verify.forced import Forced, inertial, light
 from polypod.verify.placement import BASE, PLATFORM, cross, inverse, turn_about
-from polypod.verify.rows import Links, Start
+from polypod.verify.rows import Start
 from polypod.verify.tree import POINT, Body, Closure, Freedom, Multibody, joint_values
 
 Array = NDArray[np.float64]
 
 STIFF = {"solimp": "0.9999 0.9999 0.001 0.5 2", "solref": "0.0002 1"}
 """The highest impedance that MuJoCo takes, at any error, and a time constant of two steps, s."""
-PASSES = 8
-"""Solutions of a state, each with the loops' forces of those before applied as forces."""
+PATIENT = STIFF | {"solref": "1 1"}
+"""The same, but errors of position, which are rounding, are taken back slowly, not by accelerations."""
+EVEN = 0.01
+"""What a constraint gives way is proportional to the mobility of its links, which MuJoCo takes from the zero
+of the model: a light link that carries heavy ones hardly holds them. In passes all get this part of the
+platform's."""
+CONVERGED = 1e-12
+"""Largest change of an acceleration from one pass to the next, as a part of the greatest of all links or of
+gravity; angular ones times the characteristic length."""
+PASSES = 50
+"""At most; most states take five."""
 STEP = 1e-4
 """s."""
-LIGHT = 1e-8
-"""Mass of a link that should have none, as a part of the platform's: MuJoCo needs some. Inertia likewise."""
 
 
 def mjcf(tree: Multibody, constraint: dict[str, str] | None = None) -> str:
@@ -121,14 +132,15 @@ def _cross(parent: Any, tree: Multibody, name: str, cross: Cross) -> Any:
     """The cross of a universal joint, a body of hardly any mass."""
     node = ElementTree.SubElement(parent, "body", name=name, pos=_text(cross.origin))
     _joint(node, f"{name} 0", Freedom("revolute", cross.hinge))
-    light = LIGHT * _platform_mass(tree)
-    size = _text([light * tree.scale**2] * 3)
-    ElementTree.SubElement(node, "inertial", pos="0 0 0", mass=repr(light), diaginertia=size)
+    _inertial(node, POINT, *light(tree))
     return node
 
 
-def _platform_mass(tree: Multibody) -> float:
-    return float(next(body.mass for body in tree.bodies if body.name == PLATFORM))
+def _inertial(node: Any, center: Array, mass: float, inertia: Array) -> None:
+    six = [*np.diag(inertia), inertia[0, 1], inertia[0, 2], inertia[1, 2]]
+    ElementTree.SubElement(
+        node, "inertial", pos=_text(center), mass=repr(float(mass)), fullinertia=_text(six)
+    )
 
 
 def _body(parent: Any, tree: Multibody, body: Body, place: Array) -> Any:
@@ -137,16 +149,7 @@ def _body(parent: Any, tree: Multibody, body: Body, place: Array) -> Any:
     )
     for i, freedom in enumerate(body.freedoms):
         _joint(node, f"{body.name} {i}", freedom)
-    # The efficiency divides the platform's own term alone [T15].
-    share = 1.0 / tree.geometry["efficiency"] if body.name == PLATFORM else 1.0
-    light = LIGHT * _platform_mass(tree)
-    mass = share * body.mass + light * (body.mass == 0.0)
-    # Weak axes get a little too: a link turns about each.
-    inertia = share * body.inertia + light * tree.scale**2 * np.eye(3)
-    six = [*np.diag(inertia), inertia[0, 1], inertia[0, 2], inertia[1, 2]]
-    ElementTree.SubElement(
-        node, "inertial", pos=_text(body.center), mass=repr(float(mass)), fullinertia=_text(six)
-    )
+    _inertial(node, body.center, *(inertial(tree, body) if body.mass > 0.0 else light(tree)))
     return node
 
 
@@ -178,17 +181,31 @@ def _quaternion(frame: Array) -> Array:
 
 
 class Model:
-    """A compiled model, with stiff or with MuJoCo's own constraints."""
+    """A compiled model, by default with MuJoCo's own constraints."""
 
-    def __init__(self, tree: Multibody, constraint: dict[str, str] | None, passes: int) -> None:
-        self.tree, self.passes = tree, passes
+    def __init__(self, tree: Multibody, constraint: dict[str, str] | None = None) -> None:
+        self.tree = tree
         self._crosses = [(c, t) for c in tree.closures if (t := _ties(tree, c).cross) is not None]
         self.model = mujoco.MjModel.from_xml_string(mjcf(tree, constraint))
         self.data = mujoco.MjData(self.model)
         self._bodies = {body.name: self.model.body(body.name).id for body in tree.bodies}
+        self._set_light_inertias()
 
-    def accelerations(self, start: Start, twist: Array, wrench: Array, forces: Array) -> dict[str, Array]:
-        """(6,) of each body under forces: of its mass centre, of o for the platform, and angular."""
+    def _set_light_inertias(self) -> None:
+        """Those of `inertial`: a model file takes no moment beyond the sum of the two others."""
+        for body in self.tree.bodies:
+            if body.mass == 0.0:
+                number = self._bodies[body.name]
+                # A sphere to the compiler, which may have chosen any axes.
+                self.model.body_iquat[number] = [1.0, 0.0, 0.0, 0.0]
+                self.model.body_inertia[number] = np.diag(inertial(self.tree, body)[1])
+
+    def hold_evenly(self) -> None:
+        """All constraints give way alike, see `EVEN`."""
+        self.model.body_invweight0[:] = EVEN / self.model.body_mass[self._bodies[PLATFORM]]
+
+    def passes(self, start: Start, twist: Array, wrench: Array, forces: Array) -> Iterator[Array]:
+        """(bodies, 6) as `Forced.accelerations`: with MuJoCo's loops, then less and less soft ones [T64]."""
         model, data = self.model, self.data
         mujoco.mj_resetData(model, data)
         self._put(start)
@@ -197,24 +214,24 @@ class Model:
             data.qfrc_applied[self._joint(leg.piston, 0).dofadr[0]] = force
         damping = np.repeat([geometry["linear_damping"], geometry["angular_damping"]], 3)
         pull = share * (wrench - damping * twist)
-        platform = self._bodies[PLATFORM]
         point = start.placements[PLATFORM][:3, 3]
-        mujoco.mj_applyFT(model, data, pull[:3], pull[3:], point, platform, data.qfrc_applied)
-        for i in range(self.passes):
-            if i > 0:
-                # What the loops held so far is applied, so that only the rest gives way.
-                data.qfrc_applied += data.qfrc_constraint
+        mujoco.mj_applyFT(model, data, pull[:3], pull[3:], point, self._bodies[PLATFORM], data.qfrc_applied)
+        while True:
             mujoco.mj_forward(model, data)
-        rates = data.qacc.copy()
-        drift, linear, angular = np.zeros((3, model.nv)), np.zeros((3, model.nv)), np.zeros((3, model.nv))
-        found = {}
-        for body in self.tree.bodies:
+            yield self._accelerations(point)
+            # What the loops held so far is applied, so that only the rest gives way.
+            data.qfrc_applied += data.qfrc_constraint
+
+    def _accelerations(self, point: Array) -> Array:
+        model, data = self.model, self.data
+        jacobian, drift = np.zeros((6, model.nv)), np.zeros((6, model.nv))
+        found = np.zeros((len(self.tree.bodies), 6))
+        for row, body in zip(found, self.tree.bodies, strict=True):
             number = self._bodies[body.name]
-            at = point if body.name == PLATFORM else data.xipos[number].copy()
-            mujoco.mj_jac(model, data, linear, angular, at, number)
-            both = np.concatenate([linear, angular])
-            mujoco.mj_jacDot(model, data, drift, angular, at, number)
-            found[body.name] = both @ rates + np.concatenate([drift, angular]) @ data.qvel
+            at = point if body.name == PLATFORM else data.xipos[number]
+            mujoco.mj_jac(model, data, jacobian[:3], jacobian[3:], at, number)
+            mujoco.mj_jacDot(model, data, drift[:3], drift[3:], at, number)
+            row[:] = jacobian @ data.qacc + drift @ data.qvel
         return found
 
     def _joint(self, body: str, i: int) -> Any:
@@ -254,57 +271,50 @@ class Model:
         data.qvel[:] = np.linalg.lstsq(both, rates)[0]
 
 
-class Twin:
-    """The mechanism with stiff constraints, and beside it with MuJoCo's defaults."""
+class Twin(Forced):
+    """The mechanism with loops made hard, and beside it with MuJoCo's own and with its stiffest."""
 
     version: str = mujoco.__version__
 
     def __init__(self, tree: Multibody) -> None:
-        self.tree = tree
-        self.links = Links(tree)
-        self.models = [Model(tree, None, 1), Model(tree, STIFF, 1), Model(tree, STIFF, PASSES)]
-        """MuJoCo as it is, with stiff loops, and what is compared."""
-        self._gaps = [0.0, 0.0]
+        super().__init__(tree)
+        self.soft = {"default": Model(tree), "stiff": Model(tree, STIFF)}
+        self.hard = Model(tree, PATIENT)
+        self.hard.hold_evenly()
+        self.gaps: dict[str, float] = {}
+        """Largest error of the platform's acceleration with each of `soft`, as a part of it and gravity."""
 
     def notes(self) -> list[str]:
         """How far MuJoCo's soft loops are off."""
-        default, stiff = self._gaps
+        if not self.gaps:
+            return []
         return [
-            f"Soft loops: the platform's acceleration is off by up to {default:.2g} of itself and gravity "
-            f"with MuJoCo's default solref and solimp, by {stiff:.2g} with the stiffest, solimp "
-            f"{STIFF['solimp'].split()[0]}; compared after {PASSES} passes, each with the loops' forces of "
-            "those before applied."
+            "Soft loops: the platform's acceleration is off by up to "
+            f"{self.gaps['default']:.2g} of itself and gravity with MuJoCo's default solref and solimp, "
+            f"by {self.gaps['stiff']:.2g} with the stiffest, solimp {STIFF['solimp'].split()[0]}; compared "
+            f"after passes that apply the loops' forces of those before, to a change of {CONVERGED:.0e}."
         ]
 
-    def answer(
-        self, pose: Array, twist: Array, wrench: Array, forces: Array
-    ) -> tuple[dict[str, Any], Status]:
-        """Accelerations at one state under the forces given, SI, base axes; and what became of it.
-
-        Args:
-            pose: (4, 4).
-            twist: (6,).
-            wrench: (6,), load at o in base axes.
-            forces: (legs,), of the prismatic joints.
-        """
-        if not all(np.isfinite(a).all() for a in (pose, twist, wrench, forces)):
-            return {}, Status.INVALID_INPUT
-        start = self.links.start(pose, twist)
-        if start.status is not Status.OK:
-            return {"closure": start.closure}, start.status
-        *soft, moved = (model.accelerations(start, twist, wrench, forces) for model in self.models)
-        right = moved[PLATFORM][:3]
+    def accelerations(self, start: Start, twist: Array, wrench: Array, forces: Array) -> Array | Status:
+        """`Forced.accelerations`; NOT_CONVERGED where `PASSES` passes are not enough."""
+        state = (start, twist, wrench, forces)
+        moved = self._converged(self.hard.passes(*state))
+        if moved is None:
+            return Status.NOT_CONVERGED
+        platform = self.numbers[PLATFORM]
+        right = moved[platform, :3]
         size = float(np.linalg.norm(right) + np.linalg.norm(self.tree.geometry["gravity"]))
-        for i, one in enumerate(soft):
-            off = float(np.linalg.norm(one[PLATFORM][:3] - right))
-            self._gaps[i] = max(self._gaps[i], off / size if size > 0.0 else 0.0)
-        legs = self.tree.legs
-        return {
-            "closure": start.closure,
-            "platform_acceleration": moved[PLATFORM][:3],
-            "platform_eps": moved[PLATFORM][3:],
-            "leg_eps": np.array([moved[leg.cylinder][3:] for leg in legs]),
-            "piston_acceleration": np.array([moved[leg.piston][:3] for leg in legs]),
-            "cylinder_acceleration": np.array([moved[leg.cylinder][:3] for leg in legs]),
-            "rod_eps": np.array([moved[rod][3:] for rod in self.tree.rods]).reshape(-1, 3),
-        }, Status.OK
+        for name, model in self.soft.items():
+            off = float(np.linalg.norm(next(model.passes(*state))[platform, :3] - right))
+            self.gaps[name] = max(self.gaps.get(name, 0.0), off / size if size > 0.0 else 0.0)
+        return moved
+
+    def _converged(self, passes: Iterable[Array]) -> Array | None:
+        """The accelerations that a pass no longer changes."""
+        arcs = np.repeat([1.0, self.tree.scale], 3)
+        gravity = float(np.linalg.norm(self.tree.geometry["gravity"]))
+        for before, after in pairwise(islice(passes, PASSES)):
+            change, size = (float(np.max(np.abs(a * arcs))) for a in (after - before, after))
+            if change <= CONVERGED * max(size, gravity):
+                return after
+        return None

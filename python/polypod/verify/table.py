@@ -26,22 +26,25 @@ TOLERANCE = 1e-9
 
 
 class Engine(NamedTuple):
-    """Another engine: how it is written, the module that it comes in, and the module here that drives it."""
+    """Another engine."""
 
     title: str
+    package: str
+    """To install, from PyPI."""
     module: str
+    """That it comes in."""
     driver: str
+    """The module here with its `Twin`."""
     approximate: float | None = None
     """Tolerance of an engine that is given Polypod's forces and answers with accelerations, all but exact.
     None for one that is given the motion and answers exactly."""
 
 
 ENGINES = {
-    "pinocchio": Engine("Pinocchio", "pinocchio", "polypod.verify.pinocchio"),
-    # Exudyn takes numerical differences for its initial accelerations, which leaves some eight digits.
-    "exudyn": Engine("Exudyn", "exudyn", "polypod.verify.exudyn", approximate=1e-6),
-    # MuJoCo's loops are soft, and its links cannot be without mass.
-    "mujoco": Engine("MuJoCo", "mujoco", "polypod.verify.mujoco", approximate=1e-6),
+    "pinocchio": Engine("Pinocchio", "pin", "pinocchio", "polypod.verify.pinocchio"),
+    # Both give links without mass some. Exudyn's initial accelerations come from numerical differences.
+    "exudyn": Engine("Exudyn", "exudyn", "exudyn", "polypod.verify.exudyn", approximate=1e-6),
+    "mujoco": Engine("MuJoCo", "mujoco", "mujoco", "polypod.verify.mujoco", approximate=1e-6),
 }
 """The engines by the names that `verify` takes."""
 
@@ -320,15 +323,14 @@ def _states(
     return States(poses, arrays["twist"], arrays["acceleration"], (arrays.get("wrench"), wrench_axes))
 
 
-def _load(tree: Multibody, states: States) -> Array:
-    """(N, 6): the load at o in base axes; the file's own where the states have none."""
-    wrench, axes = states.load
+def load_at_o(geometry: Mapping[str, Any], pose: Array, wrench: Array | None, axes: str) -> Array:
+    """(N, 6): the load at o in base axes at poses (N, 4, 4); the file's own where there is no wrench."""
     if wrench is None:
-        own = tree.geometry["load"]
+        own = geometry["load"]
         wrench, axes = np.array([*own["force"], *own["torque"]]), own["axes"]
-    load = np.broadcast_to(wrench, (len(states.pose), 6)).reshape(-1, 2, 3)
+    load = np.broadcast_to(wrench, (len(pose), 6)).reshape(-1, 2, 3)
     if axes == "platform":
-        load = np.einsum("nij,nkj->nki", states.pose[:, :3, :3], load)
+        load = np.einsum("nij,nkj->nki", pose[:, :3, :3], load)
     return load.reshape(-1, 6)
 
 
@@ -370,7 +372,7 @@ def engine_class(name: str) -> type[Twin] | type[Driven]:
         raise UnknownNameError("engine", name, ENGINES)
     engine = ENGINES[name]
     if find_spec(engine.module) is None:
-        raise MissingEngineError(engine.title)
+        raise MissingEngineError(engine.title, engine.package)
     twin: type[Twin] | type[Driven] = importlib.import_module(engine.driver).Twin
     return twin
 
@@ -424,7 +426,7 @@ def _compare(
     closure = 0.0
     twin: Any = kind(tree)
     driven = ENGINES[name].approximate is not None
-    loads = _load(tree, states)
+    loads = load_at_o(tree.geometry, states.pose, *states.load)
     for i, (pose, twist, acceleration) in enumerate(zip(*states[:3], strict=True)):
         if driven:
             found, status = twin.answer(pose, twist, loads[i], mine["forces"][i])

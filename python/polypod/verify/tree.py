@@ -87,6 +87,8 @@ class LegParts:
     actuated: bool
     length: float
     """Distance from B to b where the joint is at zero, m."""
+    spins: bool
+    """Whether the leg may turn freely about its own axis."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,7 +128,8 @@ def describe(mech: Mechanism) -> Multibody:
         squares = _platform_squares(leg["platform"])
         closures.append(Closure(f"leg {leg['name']} platform joint", (piston, PLATFORM), ends, squares))
         length = float(np.linalg.norm(zero[piston][:3, 3] - zero[cylinder][:3, 3]))
-        parts.append(LegParts(leg["name"], cylinder, piston, leg["actuated"], length))
+        spins = turning_of(geometry, leg) is None
+        parts.append(LegParts(leg["name"], cylinder, piston, leg["actuated"], length, spins))
     bodies.append(_body(PLATFORM, BASE, zero, (Freedom("free", POINT),), geometry["platform"]))
     return Multibody(
         name=mech.name,
