@@ -36,6 +36,7 @@ pub mod singularity;
 pub mod spatial;
 pub mod spec;
 pub mod status;
+mod svd;
 pub mod workspace;
 
 // The tests of the modules use the mechanisms of the other tests.
