@@ -2,6 +2,7 @@
 
 mod checks;
 mod coordinates;
+mod derivatives;
 mod dynamics;
 mod forward;
 mod kinematics;
@@ -10,6 +11,7 @@ mod singularity;
 
 pub use checks::CONSTRAINT_TOLERANCE;
 pub use coordinates::{Coordinates, coordinate_values, states};
+pub use derivatives::{inverse_dynamics_derivatives, regressors};
 pub use dynamics::{Loads, coupled_forces, inverse_dynamics, power};
 pub use forward::{AllModes, assembly_modes, forward_kinematics};
 pub use kinematics::{
