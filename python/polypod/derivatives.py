@@ -1,4 +1,4 @@
-"""Derivatives of inverse dynamics, the regressor of inertial parameters, and those that forces can tell apart.
+"""Derivatives of inverse dynamics, the regressor, and the inertial parameters that forces can tell apart.
 
 The shapes are written with n legs, k multipliers, m coordinates, p parameters, b base parameters.
 """
@@ -27,8 +27,8 @@ class InverseDynamicsDerivatives(NamedTuple):
     coordinates: tuple[str, ...]
     """Names of the m coordinates that are varied; dependent ones follow."""
     bodies: tuple[str, ...]
-    """Names of the p numbers of the bodies, such as "piston 1 center_y": in the axes of the link, inertia about
-    the mass centre. Where a leg spins freely only those of a body symmetric about it."""
+    """Names of the p numbers of the bodies, such as "piston 1 center_y": in the axes of the link, inertia
+    about the mass centre. Where a leg spins freely only those of a body symmetric about it."""
     forces_by_pose: Array
     """(..., n, 6), N/m and N/rad."""
     constraint_by_pose: Array
@@ -103,8 +103,8 @@ class BaseParameters:
     parameters: tuple[str, ...]
     """Names of all p parameters."""
     remainders: Array
-    """(p,): what is left of each parameter's column after the ones kept before it, as a part of itself: 0 where
-    it is dependent. How clear the rank is shows in the gap between both kinds."""
+    """(p,): what is left of each parameter's column after the ones kept before it, as a part of itself: 0
+    where it is dependent. How clear the rank is shows in the gap between both kinds."""
 
     def expression(self, index: int, digits: int = 4) -> str:
         """A base parameter as a sum of parameters by name, such as "platform mc_x + 0.14 piston 1 m"."""

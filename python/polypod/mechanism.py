@@ -771,8 +771,8 @@ class Mechanism:
     ) -> InverseDynamicsDerivatives:
         """Exact derivatives of the active forces and multipliers of `inverse_dynamics` [T56, T57].
 
-        By pose, twist and acceleration; by coordinates, their rates and second rates; by mass, mass centre and
-        inertia of every link. Of dual numbers: no differences are taken.
+        By pose, twist and acceleration; by coordinates, their rates and second rates; by mass, mass centre
+        and inertia of every link. Of dual numbers: no differences are taken.
 
         Args:
             pose: (..., 4, 4).
@@ -832,7 +832,7 @@ class Mechanism:
         From the regressors of random motions about the centre pose, the same every time.
 
         Raises:
-            UnsupportedError: the mechanism is singular wherever it was looked at, so that forces do not exist.
+            UnsupportedError: the mechanism is singular wherever it was looked at: there are no forces.
 
         >>> import polypod as pp
         >>> mech = pp.load("lu-3spu-2rpu-r")
