@@ -826,8 +826,9 @@ class Mechanism:
         >>> bool(abs(mech.forward_dynamics(pose, np.zeros(6), holding).acceleration).max() < 1e-9)
         True
         """
-        shape, (poses, twists, flat, *load) = self._driven_states(pose, twist, forces, wrench, wrench_axes)
-        return ForwardDynamics(**_shaped(self._core.forward_dynamics(poses, twists, flat, *load), shape))
+        states = {"pose": (pose, (4, 4)), "twist": (twist, (6,)), "forces": (forces, (self.n_legs,))}
+        shape, args = self._loaded(wrench, wrench_axes, **states)
+        return ForwardDynamics(**_shaped(self._core.forward_dynamics(*args), shape))
 
     def equations_of_motion(
         self, pose: ArrayLike, twist: ArrayLike, coordinates: str | Sequence[str] | None = None
@@ -1138,36 +1139,19 @@ class Mechanism:
         wrench: ArrayLike | None,
         wrench_axes: str,
     ) -> tuple[tuple[int, ...], tuple[Any, ...]]:
-        if wrench_axes not in ("base", "platform"):
-            raise UnknownNameError("wrench_axes", wrench_axes, ("base", "platform"))
-        if wrench is None:
-            shape, states = self._states(pose, twist, acceleration)
-            return shape, (*states, None, False)
-        shape, arrays = self._batch(
-            pose=(pose, (4, 4)), twist=(twist, (6,)), acceleration=(acceleration, (6,)), wrench=(wrench, (6,))
-        )
-        return shape, (*arrays, wrench_axes == "platform")
+        states = {"pose": (pose, (4, 4)), "twist": (twist, (6,)), "acceleration": (acceleration, (6,))}
+        return self._loaded(wrench, wrench_axes, **states)
 
-    def _driven_states(
-        self,
-        pose: ArrayLike,
-        twist: ArrayLike,
-        forces: ArrayLike,
-        wrench: ArrayLike | None,
-        wrench_axes: str,
+    def _loaded(
+        self, wrench: ArrayLike | None, wrench_axes: str, **arguments: tuple[ArrayLike, tuple[int, ...]]
     ) -> tuple[tuple[int, ...], tuple[Any, ...]]:
-        if wrench_axes not in ("base", "platform"):
-            raise UnknownNameError("wrench_axes", wrench_axes, ("base", "platform"))
-        arguments: dict[str, tuple[ArrayLike, tuple[int, ...]]] = {
-            "pose": (pose, (4, 4)),
-            "twist": (twist, (6,)),
-            "forces": (forces, (self.n_legs,)),
-        }
-        if wrench is not None:
-            arguments["wrench"] = (wrench, (6,))
-        shape, arrays = self._batch(**arguments)
-        load = (None, False) if wrench is None else (arrays[3], wrench_axes == "platform")
-        return shape, (*arrays[:3], *load)
+        """The arrays of `_batch`, then the load, if it is not the own one, and whether in platform axes."""
+        check_wrench_axes(wrench_axes)
+        if wrench is None:
+            shape, arrays = self._batch(**arguments)
+            return shape, (*arrays, None, False)
+        shape, arrays = self._batch(**arguments, wrench=(wrench, (6,)))
+        return shape, (*arrays, wrench_axes == "platform")
 
     @staticmethod
     def _batch(**arguments: tuple[ArrayLike, tuple[int, ...]]) -> tuple[tuple[int, ...], list[Array]]:
@@ -1197,6 +1181,12 @@ def _positive(name: str, value: float) -> float:
 
 def _from_parts(data: dict[str, Any], text: str | None) -> Mechanism:
     return Mechanism(data, text=text)
+
+
+def check_wrench_axes(name: str) -> None:
+    """Refuses axes that a load cannot be given in."""
+    if name not in ("base", "platform"):
+        raise UnknownNameError("wrench_axes", name, ("base", "platform"))
 
 
 def _number(name: str, value: ArrayLike) -> Array:

@@ -18,7 +18,7 @@ from scipy.optimize import brentq
 from polypod import _core
 from polypod.answers import ForwardDynamics, State
 from polypod.errors import PolypodError, ShapeError, UnknownNameError
-from polypod.mechanism import Mechanism
+from polypod.mechanism import Mechanism, check_wrench_axes
 from polypod.passages import sampled_passages
 from polypod.results import Solution
 from polypod.singularity import Determinant
@@ -106,8 +106,7 @@ class _Drive:
     """Forces and load at a state."""
 
     def __init__(self, mech: Mechanism, forces: Input | None, wrench: Input | None, wrench_axes: str) -> None:
-        if wrench_axes not in ("base", "platform"):
-            raise UnknownNameError("wrench_axes", wrench_axes, ("base", "platform"))
+        check_wrench_axes(wrench_axes)
         self.mech, self.wrench_axes = mech, wrench_axes
         self._forces = _law("forces", np.zeros(mech.n_legs) if forces is None else forces, mech.n_legs)
         self._wrench = None if wrench is None else _law("wrench", wrench, 6)

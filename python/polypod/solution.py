@@ -131,9 +131,7 @@ def solve(
     >>> dict(solution.dataset.force.sizes)
     {'time': 801, 'leg': 5}
     """
-    state = mech.state(
-        motion.coordinates, motion.rates, motion.second_rates, branch=motion.branch, continued=True
-    )
+    state = states_along(mech, motion)
     total, parts = len(motion.time), []
     for start in range(0, total, CHUNK):
         chunk = slice(start, min(start + CHUNK, total))
@@ -154,6 +152,13 @@ def solve(
     }
     dataset = dataset_of(mech, motion.time, values, attrs)
     return Solution(dataset.assign_attrs(singularities=json.dumps(passages, ensure_ascii=False)))
+
+
+def states_along(mech: Mechanism, motion: Motion) -> State:
+    """Pose, twist and acceleration of the platform at the times of a motion."""
+    return mech.state(
+        motion.coordinates, motion.rates, motion.second_rates, branch=motion.branch, continued=True
+    )
 
 
 def _solve_chunk(mech: Mechanism, motion: Motion, state: State, chunk: slice) -> dict[str, NDArray[Any]]:

@@ -8,7 +8,7 @@ use nalgebra::DMatrix;
 
 use crate::constraint;
 use crate::linear::{Solved, solve};
-use crate::mechanism::{Constraint, ConstraintKind, MAX_CONSTRAINTS, Mechanism};
+use crate::mechanism::{Constraint, MAX_CONSTRAINTS, Mechanism};
 use crate::spatial::{Acceleration, Pose, Twist, Vec3, Wrench};
 
 /// Newton steps from a chart's tangent to the constraints; quadratic, so that a few are enough wherever θ is small.
@@ -68,13 +68,9 @@ impl Chart {
 
     /// A constraint's row for vectors of the chart's own pose, of a constraint counted as a length.
     fn row(&self, c: &Constraint, pose: &Pose<f64>) -> [f64; 6] {
-        let unit = self.length_of(c);
+        let unit = constraint::length(c, self.scale);
         let row = constraint::row(c, pose);
         Wrench::new(row.force * unit, row.torque * (unit / self.scale)).array()
-    }
-
-    fn length_of(&self, c: &Constraint) -> f64 {
-        if c.kind == ConstraintKind::D { self.scale } else { 1.0 }
     }
 
     fn twist_of(&self, x: &[f64; 6]) -> Twist<f64> {
@@ -107,7 +103,7 @@ impl Chart {
             std::array::from_fn(|i| std::array::from_fn(|j| if i == j { 1.0 } else { 0.0 }));
         let mut values = [0.0; MAX_CONSTRAINTS];
         for (i, c) in mech.independent.iter().enumerate() {
-            let row = constraint::row(c, pose) * self.length_of(c);
+            let row = constraint::row(c, pose) * constraint::length(c, self.scale);
             for (j, column) in columns.iter().enumerate() {
                 m[i][j] = row.power(column);
             }
@@ -134,7 +130,7 @@ impl Chart {
             let (pose, turn) = at;
             let value = |i: usize, _: &Wrench<f64>| {
                 let c = &mech.independent[i];
-                -constraint::value(c, &pose) * self.length_of(c)
+                -constraint::value(c, &pose) * constraint::length(c, self.scale)
             };
             let step = self.across(mech, &pose, turn, value).x;
             let size = step.iter().fold(0.0_f64, |m, s| if s.abs() > m || s.is_nan() { s.abs() } else { m });

@@ -223,6 +223,12 @@ pub fn unit(c: &Constraint, scale: f64) -> f64 {
     if c.kind == ConstraintKind::D { 1.0 } else { scale }
 }
 
+/// What makes a constraint's value a length.
+#[must_use]
+pub fn length(c: &Constraint, scale: f64) -> f64 {
+    if c.kind == ConstraintKind::D { scale } else { 1.0 }
+}
+
 /// Size of a row with its torque part divided by the length `scale`.
 #[must_use]
 pub fn row_size(row: &Wrench<f64>, scale: f64) -> f64 {

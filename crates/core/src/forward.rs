@@ -126,8 +126,9 @@ fn newton(mech: &Mechanism, pose: &Pose<f64>, squares: &[f64; 6], to: &[f64; 6])
     }
 }
 
+/// The size of a solution (v/Λ, ω) of the system.
 #[inline(always)]
-fn size(x: &[f64; 6]) -> f64 {
+pub(crate) fn size(x: &[f64; 6]) -> f64 {
     x.iter().map(|e| e * e).sum::<f64>().sqrt()
 }
 

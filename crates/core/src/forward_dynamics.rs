@@ -8,7 +8,7 @@ use crate::coordinates::{self, MAX_COORDINATES, Set, Values};
 use crate::dynamics::{damping_wrench, resultant};
 use crate::leg;
 use crate::linear::solve;
-use crate::mechanism::{ConstraintKind, MAX_CONSTRAINTS, Mechanism};
+use crate::mechanism::{MAX_CONSTRAINTS, Mechanism};
 use crate::quadratic::quadratic;
 use crate::real::{Jet, Ordered, Real};
 use crate::spatial::{Acceleration, Motion, Pose, Twist, Vec3, Wrench};
@@ -68,7 +68,7 @@ pub fn forward_dynamics<T: Real>(
             m[6 + k][6 + k] = T::one();
             continue;
         };
-        let (size, row) = (length_of(c.kind, scale), constraint::row(c, pose).array());
+        let (size, row) = (constraint::length(c, scale), constraint::row(c, pose).array());
         for i in 0..6 {
             let entry = row[i].scale(size * arcs[i]);
             (m[6 + k][i], m[i][6 + k]) = (entry, -entry);
@@ -79,16 +79,11 @@ pub fn forward_dynamics<T: Real>(
     Driven {
         acceleration: Acceleration::from_array(std::array::from_fn(|i| solved.x[i].scale(arcs[i]))),
         multipliers: std::array::from_fn(|k| match mech.independent.get(k) {
-            Some(c) => (solved.x[6 + k] / unit).scale(length_of(c.kind, scale)),
+            Some(c) => (solved.x[6 + k] / unit).scale(constraint::length(c, scale)),
             None => T::zero(),
         }),
         pivots: solved.pivots,
     }
-}
-
-/// What makes a constraint a length.
-fn length_of(kind: ConstraintKind, scale: f64) -> f64 {
-    if kind == ConstraintKind::D { scale } else { 1.0 }
 }
 
 #[inline(always)]
@@ -114,12 +109,7 @@ fn unit<T: Real>(j: usize) -> Twist<T> {
 #[inline(always)]
 fn inertia<T: Real>(mech: &Mechanism, still: &Motion<T>, weight: Wrench<T>, a: &Twist<T>) -> Wrench<T> {
     let moved = Motion { acceleration: Acceleration::new(a.v, a.omega), ..*still };
-    difference(weight, resultant(mech, &moved, Wrench::zero()))
-}
-
-#[inline(always)]
-fn difference<T: Real>(a: Wrench<T>, b: Wrench<T>) -> Wrench<T> {
-    Wrench::new(a.force - b.force, a.torque - b.torque)
+    weight - resultant(mech, &moved, Wrench::zero())
 }
 
 /// The terms of `M q'' + C q' + D q' + g = Jᵀ f + Sᵀ W/η` in some velocities q' of the platform \[T50\]-\[T52\]. The first
@@ -232,7 +222,7 @@ fn equations<T: Real>(
     let centripetal = |rates: &[T; 6]| {
         let moving = motion(rates);
         let braked = weight + damping(&moving.twist);
-        difference(braked, resultant(mech, &moving, Wrench::zero()))
+        braked - resultant(mech, &moving, Wrench::zero())
     };
     // The polar form ¼ [c(q' + s e_j) - c(q' - s e_j)]/s, both parts scaled so that what they add is as large as weights.
     let brisk = T::lit((mech.characteristic_length * STANDARD_GRAVITY).sqrt());
@@ -241,7 +231,7 @@ fn equations<T: Real>(
         let step = brisk / size(mech, &twists[j]);
         let moved =
             |step: T| std::array::from_fn(|i| if i == j { rates[i] * pace + step } else { rates[i] * pace });
-        let both = difference(centripetal(&moved(step)), centripetal(&moved(-step)));
+        let both = centripetal(&moved(step)) - centripetal(&moved(-step));
         both * (T::lit(0.25) / (step * pace))
     };
     Equations {

@@ -5,17 +5,11 @@ use crate::forward::{
     CONTRACTION, FOLD_PIVOTS, Found, LONGEST_STEP, PIECE_STEPS, ROUNDING, SMALL_STEP, System, error,
     forward_kinematics, polish, squares, step_of, system,
 };
-use crate::lanes::{self, Lanes, Task};
+use crate::lanes::{self, Lanes, Row, Task, WIDTH};
 use crate::linear::{Solved, solve};
 use crate::mechanism::Mechanism;
 use crate::spatial::{Mat3, Pose, Vec3};
 use crate::status::Status;
-
-/// States side by side.
-pub const WIDTH: usize = 8;
-
-/// One number of each.
-type Row = [f64; WIDTH];
 
 /// The columns of R and o of each.
 type Poses = [Row; 12];

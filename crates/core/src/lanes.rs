@@ -5,6 +5,12 @@
 
 use crate::real::Ordered;
 
+/// Numbers that go side by side, in as many registers as it takes.
+pub const WIDTH: usize = 8;
+
+/// One number of each.
+pub type Row = [f64; WIDTH];
+
 /// A register of numbers.
 pub trait Lanes: Ordered {
     const WIDTH: usize;

@@ -3,7 +3,7 @@
 
 use rayon::prelude::*;
 
-use crate::forward::{System, continuation, forward_kinematics, squares, step_of, system};
+use crate::forward::{System, continuation, forward_kinematics, size, squares, step_of, system};
 use crate::leg;
 use crate::limits::{Bound, Measure};
 use crate::linear::solve;
@@ -250,8 +250,7 @@ impl Lattice {
             let (neighbour, pose) = &self.front[i];
             let System { residual, matrix } = system(mech, pose, &to);
             let x = solve(matrix, residual.map(|f| -f)).x;
-            let size = x.iter().map(|e| e * e).sum::<f64>().sqrt();
-            if is_known(&markers, &pose.stepped(&step_of(mech, x, 1.0)), PREDICTED * size) {
+            if is_known(&markers, &pose.stepped(&step_of(mech, x, 1.0)), PREDICTED * size(&x)) {
                 continue;
             }
             match self.step(mech, pose, &squares(&self.lengths(*neighbour as i64)), &to) {

@@ -2,7 +2,7 @@
 
 use crate::complex::Complex;
 use crate::forward::{FOLD_PIVOTS, System, system};
-use crate::lanes::{self, Lanes, Task};
+use crate::lanes::{self, Lanes, Row, Task, WIDTH};
 use crate::linear::{Solved, solve, solve_all};
 use crate::mechanism::Mechanism;
 use crate::real::{Ordered, Real};
@@ -335,12 +335,6 @@ fn step_size<T: Ordered>(mech: &Mechanism, place: &Place<Complex<T>>, x: &[Compl
 pub fn modulus(v: Vec3<C>) -> f64 {
     (v.x.norm_sqr() + v.y.norm_sqr() + v.z.norm_sqr()).sqrt()
 }
-
-/// Solutions that are followed side by side.
-const WIDTH: usize = 8;
-
-/// One number of each.
-type Row = [f64; WIDTH];
 
 /// Real and imaginary parts of the q and o of each: places, steps of them, or rates.
 type Block = [Row; 14];

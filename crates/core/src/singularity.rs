@@ -7,7 +7,7 @@ use crate::constraint;
 use crate::jacobian::Matrix6;
 use crate::leg;
 use crate::linear;
-use crate::mechanism::{Constraint, ConstraintKind, Mechanism};
+use crate::mechanism::{Constraint, Mechanism};
 use crate::real::{Dual, Real};
 use crate::spatial::{Pose, Twist, Vec3, Wrench};
 
@@ -114,8 +114,7 @@ pub struct Screw {
 /// `(0, τ)` for kind D \[T30\].
 #[inline(always)]
 fn constraint_row<T: Real>(c: &Constraint, pose: &Pose<T>, scale: f64) -> [T; 6] {
-    let row = constraint::row(c, pose);
-    pure_row(if c.kind == ConstraintKind::D { row * T::lit(scale) } else { row }, scale)
+    pure_row(constraint::row(c, pose) * T::lit(constraint::length(c, scale)), scale)
 }
 
 #[inline(always)]

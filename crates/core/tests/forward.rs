@@ -4,7 +4,7 @@ mod common;
 
 use common::{Draw, on_rod, published, states, with_leg};
 use polypod_core::coordinates::{MAX_COORDINATES, Set, Values};
-use polypod_core::forward::{error, forward_kinematics, polish, step_of};
+use polypod_core::forward::{error, forward_kinematics, polish, squares, step_of};
 use polypod_core::jacobian::scaled_jacobian;
 use polypod_core::leg;
 use polypod_core::linear::solve;
@@ -15,10 +15,6 @@ use polypod_core::status::Status;
 
 fn lengths(mech: &Mechanism, pose: &Pose<f64>) -> Vec<f64> {
     mech.actuated().map(|(_, l)| leg::position(l, pose).length).collect()
-}
-
-fn squares(lengths: &[f64]) -> [f64; 6] {
-    std::array::from_fn(|i| lengths.get(i).map_or(0.0, |l| l * l))
 }
 
 /// o in metres and turns in radians: largest difference.

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from polypod.errors import MissingEngineError, PolypodError, ShapeError, UnknownNameError
 from polypod.mechanism import Mechanism
 from polypod.motion import Motion
+from polypod.solution import states_along
 from polypod.status import Status
 from polypod.verify.tree import Multibody, describe
 
@@ -221,9 +222,7 @@ def verify(
     >>> verify(mech, motion).agrees
     True
     """
-    state = mech.state(
-        motion.coordinates, motion.rates, motion.second_rates, branch=motion.branch, continued=True
-    )
+    state = states_along(mech, motion)
     load = (motion.wrench, motion.wrench_axes)
     states = States(state.pose, state.twist, state.acceleration, load, motion.time, state.status)
     return _verify(mech, states, motion.name, engines, tolerance, progress)

@@ -35,9 +35,7 @@ pub fn inverse_dynamics(mech: &Mechanism, states: &States, loads: &Loads) -> Tab
     let (mut table, [forces, multipliers]) =
         Table::new(n, [("forces", vec![mech.legs.len()]), ("constraint", vec![mech.independent.len()])]);
     for i in 0..n {
-        let (platform, status) = states.read(mech, i);
-        let load = loads.at(mech, &platform.pose, i);
-        let mut status = then(status, || check_finite(&load.array()));
+        let (platform, load, mut status) = states.read_loaded(mech, loads, i);
         if status == Status::Ok {
             let (f, pivots) = dynamics::inverse_dynamics(mech, &platform, load);
             status = outcome(mech, &f, pivots);
@@ -108,10 +106,9 @@ pub fn power(mech: &Mechanism, states: &States, loads: &Loads) -> Table {
     ];
     let (mut table, ids) = Table::new(n, names.map(|name| (name, vec![])));
     for i in 0..n {
-        let (platform, status) = states.read(mech, i);
+        let (platform, wrench, status) = states.read_loaded(mech, loads, i);
         let Motion { pose, twist, .. } = &platform;
-        let wrench = loads.at(mech, pose, i);
-        table.status[i] = then(status, || check_finite(&wrench.array()));
+        table.status[i] = status;
         if table.status[i] != Status::Ok {
             continue;
         }

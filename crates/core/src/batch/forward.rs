@@ -3,7 +3,8 @@
 use super::checks::{actuated_values, check_legs, is_rotation, joint_limits, raw_pose, then};
 use super::{FieldId, Table};
 use crate::forward::{self, Found};
-use crate::forward_lanes::{WIDTH, forward_kinematics_of};
+use crate::forward_lanes::forward_kinematics_of;
+use crate::lanes::WIDTH;
 use crate::limits;
 use crate::mechanism::Mechanism;
 use crate::modes::{self, Start};

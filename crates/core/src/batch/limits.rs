@@ -1,6 +1,6 @@
 //! Limits of many states.
 
-use super::checks::{check_finite, outcome, then};
+use super::checks::outcome;
 use super::dynamics::Loads;
 use super::{States, Table};
 use crate::dynamics;
@@ -19,10 +19,9 @@ pub fn limits(mech: &Mechanism, states: &States, loads: &Loads) -> Table {
     let needs_forces = mech.limits.iter().any(|limit| matches!(limit.measure, Measure::Force { .. }));
     let mut found = vec![0.0; m];
     for i in 0..n {
-        let (platform, status) = states.read(mech, i);
-        let load = loads.at(mech, &platform.pose, i);
-        table.status[i] = then(status, || check_finite(&load.array()));
-        if table.status[i] != Status::Ok {
+        let (platform, load, status) = states.read_loaded(mech, loads, i);
+        table.status[i] = status;
+        if status != Status::Ok {
             continue;
         }
         let forces = if needs_forces { forces(mech, &platform, load) } else { None };

@@ -26,9 +26,9 @@ pub use limits::limits;
 pub use reactions::joint_reactions;
 
 use crate::mechanism::Mechanism;
-use crate::spatial::{Acceleration, Motion, Pose, Twist};
+use crate::spatial::{Acceleration, Motion, Pose, Twist, Wrench};
 use crate::status::Status;
-use checks::{check_acceleration, check_twist, read_pose, six, then};
+use checks::{check_acceleration, check_finite, check_twist, read_pose, six, then};
 
 /// One output array: its row for a state has the given shape.
 #[derive(Clone, Debug)]
@@ -104,5 +104,12 @@ impl States<'_> {
         let status = then(status, || check_twist(mech, &pose, &twist));
         let status = then(status, || check_acceleration(mech, &pose, &twist, &acceleration));
         (Motion { pose, twist, acceleration }, status)
+    }
+
+    /// The same with the load at it.
+    fn read_loaded(&self, mech: &Mechanism, loads: &Loads, i: usize) -> (Motion<f64>, Wrench<f64>, Status) {
+        let (platform, status) = self.read(mech, i);
+        let load = loads.at(mech, &platform.pose, i);
+        (platform, load, then(status, || check_finite(&load.array())))
     }
 }

@@ -1,6 +1,6 @@
 //! Joint reactions at many states.
 
-use super::checks::{check_finite, limit_status, then};
+use super::checks::limit_status;
 use super::dynamics::Loads;
 use super::{States, Table};
 use crate::mechanism::Mechanism;
@@ -32,10 +32,9 @@ pub fn joint_reactions(mech: &Mechanism, states: &States, loads: &Loads, scale: 
     );
     let flags = |marks: &[bool; 6]| marks.map(|mark| f64::from(u8::from(mark)));
     for i in 0..n {
-        let (platform, status) = states.read(mech, i);
-        let load = loads.at(mech, &platform.pose, i);
-        table.status[i] = then(status, || check_finite(&load.array()));
-        if table.status[i] != Status::Ok {
+        let (platform, load, status) = states.read_loaded(mech, loads, i);
+        table.status[i] = status;
+        if status != Status::Ok {
             continue;
         }
         let Some(found) = reactions::solve(mech, &joints, &platform, load, scale) else {
