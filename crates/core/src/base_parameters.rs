@@ -45,8 +45,8 @@ pub fn base_parameters(mech: &Mechanism) -> Option<BaseParameters> {
     let units: Vec<f64> = regressor.parameters.iter().map(|p| unit(p, mech.characteristic_length)).collect();
     let stacked = stacked(mech, &mut regressor, &units)?;
     let (columns, remainders) = independent_columns(&stacked);
-    let kept = stacked.select_columns(&columns);
-    let solved = kept.svd(true, true).solve(&stacked, 0.0).ok()?;
+    let (q, r) = stacked.select_columns(&columns).qr().unpack();
+    let solved = r.solve_upper_triangular(&(q.transpose() * &stacked))?;
     let combination = DMatrix::from_fn(columns.len(), units.len(), |i, j| {
         let c: f64 = solved[(i, j)];
         // Its own parameter counts once, the others kept not at all.
