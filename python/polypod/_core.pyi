@@ -16,7 +16,11 @@ __all__ = [
     "Lattice",
     "Mechanism",
     "__version__",
+    "base_parameters",
     "fit_poses",
+    "inertial_parameters",
+    "inverse_dynamics_derivatives",
+    "regressor",
     "singularity_kinds",
     "statuses",
     "unsettled_zeros",
@@ -123,6 +127,26 @@ def unsettled_zeros(
 def singularity_kinds() -> list[tuple[int, str, str]]: ...
 def statuses() -> list[tuple[int, str, str]]: ...
 def fit_poses(mech: Mechanism, poses: _Array) -> _Array: ...
+def inverse_dynamics_derivatives(
+    mech: Mechanism,
+    poses: _Array,
+    twists: _Array,
+    accelerations: _Array,
+    wrenches: _Array | None,
+    platform_axes: bool,
+    set: str,
+    names: list[str] | None,
+) -> tuple[list[str], _Table]: ...
+def regressor(
+    mech: Mechanism,
+    poses: _Array,
+    twists: _Array,
+    accelerations: _Array,
+    wrenches: _Array | None,
+    platform_axes: bool,
+) -> _Table: ...
+def inertial_parameters(mech: Mechanism) -> tuple[list[str], list[str], _Array]: ...
+def base_parameters(mech: Mechanism) -> tuple[list[int], _Array, _Array] | None: ...
 
 @final
 class Chart:

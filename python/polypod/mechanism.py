@@ -38,6 +38,7 @@ from polypod.answers import (
     Published,
     State,
 )
+from polypod.derivatives import BaseParameters, InverseDynamicsDerivatives, Regressor
 from polypod.errors import (
     CoordinateError,
     Fault,
@@ -495,17 +496,7 @@ class Mechanism:
         >>> round(below, 3), round(above, 3)
         (-2.829, 2.823)
         """
-        set = ("natural" if "natural" in self._sets else "pose") if set is None else set
-        if set not in self._sets:
-            raise UnknownNameError("coordinate set", set, self._sets)
-        named = None if coordinates is None else list(coordinates)
-        if named is not None and (
-            len({*named}) != self.dof or self._set_of(dict.fromkeys(named, 0.0)) != set
-        ):
-            raise CoordinateError(
-                f"coordinates {', '.join(named)} are not those of the set {set}: "
-                f"{', '.join(self.coordinate_sets[set])}, {self.dof} of them"
-            )
+        set, named = self._varied_coordinates(set, coordinates)
         if reach is None:
             reach = float(self.inverse_kinematics(self.home).lengths.max())
         shape, (poses,) = self._batch(pose=(pose, (4, 4)))
@@ -522,6 +513,23 @@ class Mechanism:
             out["searched"],
             out["status"],
         )
+
+    def _varied_coordinates(
+        self, set: str | None, coordinates: Sequence[str] | None
+    ) -> tuple[str, list[str] | None]:
+        """The set, and those of its coordinates that are meant; None for all or for the best to give."""
+        set = ("natural" if "natural" in self._sets else "pose") if set is None else set
+        if set not in self._sets:
+            raise UnknownNameError("coordinate set", set, self._sets)
+        named = None if coordinates is None else list(coordinates)
+        if named is not None and (
+            len({*named}) != self.dof or self._set_of(dict.fromkeys(named, 0.0)) != set
+        ):
+            raise CoordinateError(
+                f"coordinates {', '.join(named)} are not those of the set {set}: "
+                f"{', '.join(self.coordinate_sets[set])}, {self.dof} of them"
+            )
+        return set, named
 
     def _length(self, length: float | None) -> float:
         """The length that turns are counted with."""
@@ -936,6 +944,110 @@ class Mechanism:
             stop=stop,
             sigma_min=sigma_min,
             progress=progress,
+        )
+
+    # --- derivatives and inertial parameters -------------------------------------------------------------
+
+    def inverse_dynamics_derivatives(
+        self,
+        pose: ArrayLike,
+        twist: ArrayLike,
+        acceleration: ArrayLike,
+        wrench: ArrayLike | None = None,
+        wrench_axes: str = "base",
+        *,
+        set: str | None = None,
+        coordinates: Sequence[str] | None = None,
+    ) -> InverseDynamicsDerivatives:
+        """Exact derivatives of the active forces and multipliers of `inverse_dynamics` [T56, T57].
+
+        By pose, twist and acceleration; by coordinates, their rates and second rates; by mass, mass centre
+        and inertia of every link. Of dual numbers: no differences are taken.
+
+        Args:
+            pose: (..., 4, 4).
+            twist: (..., 6).
+            acceleration: (..., 6).
+            wrench: load on the platform at o, (..., 6), N and N m; the mechanism's own by default. In base
+                axes it is kept, in platform axes it turns with the pose.
+            wrench_axes: the axes of `wrench`, "base" or "platform".
+            set: the coordinate set; `natural` by default, or `pose` for a mechanism without it.
+            coordinates: of the set `pose`, the `dof` coordinates to vary; by default those that determine the
+                others best at the centre pose.
+
+        Raises:
+            CoordinateError: coordinates that make up no set of this mechanism.
+            UnknownNameError: no such set.
+
+        >>> import numpy as np, polypod as pp
+        >>> mech = pp.load("lu-3spu-2rpu-r")
+        >>> pose = mech.pose({"alpha": 0.1, "p": -0.3, "h": 0.6, "beta": 0.8, "gamma": 0.6})
+        >>> by = mech.inverse_dynamics_derivatives(pose, np.zeros(6), np.zeros(6))
+        >>> by.coordinates, by.forces_by_coordinates.shape
+        (('alpha', 'p', 'h', 'beta', 'gamma'), (5, 5))
+        """
+        set, named = self._varied_coordinates(set, coordinates)
+        shape, args = self._loaded_states(pose, twist, acceleration, wrench, wrench_axes)
+        args = (*args, set, named)
+        names, table = _core.inverse_dynamics_derivatives(self._core, *args)
+        _, bodies, _ = _core.inertial_parameters(self._core)
+        return InverseDynamicsDerivatives(tuple(names), tuple(bodies), **_shaped(table, shape))
+
+    def regressor(
+        self,
+        pose: ArrayLike,
+        twist: ArrayLike,
+        acceleration: ArrayLike,
+        wrench: ArrayLike | None = None,
+        wrench_axes: str = "base",
+    ) -> Regressor:
+        """Y of `forces = Y @ parameters + offset`: forces are linear in the inertial parameters [T57].
+
+        Arguments as for `inverse_dynamics`; only the offset depends on the load.
+
+        >>> import numpy as np, polypod as pp
+        >>> mech = pp.load("lu-3spu-2rpu-r")
+        >>> pose = mech.pose({"alpha": 0.1, "p": -0.3, "h": 0.6, "beta": 0.8, "gamma": 0.6})
+        >>> y = mech.regressor(pose, np.zeros(6), np.zeros(6))
+        >>> (y.forces @ y.values + y.forces_offset).round().tolist()
+        [-13151.0, 9809.0, -4907.0, -1993.0, 10231.0]
+        """
+        shape, args = self._loaded_states(pose, twist, acceleration, wrench, wrench_axes)
+        out = _shaped(_core.regressor(self._core, *args), shape)
+        names, _, values = _core.inertial_parameters(self._core)
+        return Regressor(tuple(names), values, **out)
+
+    def base_parameters(self) -> BaseParameters:
+        """The minimal set of inertial parameters, those combinations that active forces can tell apart [T58].
+
+        From the regressors of random motions about the centre pose, the same every time.
+
+        Raises:
+            UnsupportedError: the mechanism is singular wherever it was looked at: there are no forces.
+
+        >>> import polypod as pp
+        >>> mech = pp.load("lu-3spu-2rpu-r")
+        >>> base = mech.base_parameters()
+        >>> len(base.names), len(base.parameters)
+        (69, 120)
+        >>> base.expression(base.names.index("cylinder 1 I_xx"))
+        'cylinder 1 I_xx + piston 1 I_xx'
+        """
+        found = _core.base_parameters(self._core)
+        if found is None:
+            raise UnsupportedError(
+                f"{self.name}: no regular poses were found about the centre pose, so that forces are not "
+                "determined; base parameters need a design that is not singular everywhere"
+            )
+        columns, combination, remainders = found
+        names, _, values = _core.inertial_parameters(self._core)
+        return BaseParameters(
+            tuple(names[i] for i in columns),
+            np.array(columns, dtype=np.int64),
+            combination,
+            combination @ values,
+            tuple(names),
+            remainders,
         )
 
     # --- limits ------------------------------------------------------------------------------------------

@@ -10,6 +10,7 @@ use crate::constraint;
 use crate::linear::{Solved, solve};
 use crate::mechanism::{Constraint, MAX_CONSTRAINTS, Mechanism};
 use crate::spatial::{Acceleration, Pose, Twist, Vec3, Wrench};
+use crate::svd::Svd;
 
 /// Newton steps from a chart's tangent to the constraints; quadratic, so that a few are enough wherever θ is small.
 const NEWTON_STEPS: usize = 20;
@@ -47,13 +48,9 @@ impl Chart {
         let (scale, freedoms) = (mech.characteristic_length, mech.dof());
         let mut chart = Chart { pose, scale, basis: [[0.0; 6]; 6], freedoms };
         let rows: Vec<[f64; 6]> = mech.independent.iter().map(|c| chart.row(c, &pose)).collect();
-        if rows.iter().flatten().any(|e| !e.is_finite()) {
-            return None;
-        }
         let m = DMatrix::from_fn(6, 6, |i, j| rows.get(i).map_or(0.0, |row| row[j]));
-        let svd = m.svd(false, true);
-        let vectors = svd.v_t?;
-        if !rows.is_empty() && !(svd.singular_values[rows.len() - 1] > 1e-9 * svd.singular_values[0]) {
+        let Svd { values, v_t: vectors, .. } = Svd::of(&m)?;
+        if !rows.is_empty() && !(values[rows.len() - 1] > 1e-9 * values[0]) {
             return None;
         }
         // Singular vectors come with the rows' own first.

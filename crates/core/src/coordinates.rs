@@ -49,7 +49,7 @@ const FOLD: f64 = 1e-6;
 const COSINE_ROUNDING: f64 = 1e-12;
 
 /// Pivot ratio below which the dependent coordinates are not determined.
-const DEPENDENT_PIVOTS: f64 = 1e-9;
+pub const DEPENDENT_PIVOTS: f64 = 1e-9;
 
 /// Residual, as a pure number, that is rounding of zero.
 const SOLVED: f64 = 1e-12;
@@ -143,8 +143,8 @@ impl Set {
 
     /// The numbers of a pose that satisfies the constraints: the inverse of [`Set::pose`].
     #[must_use]
-    pub fn values(&self, mech: &Mechanism, pose: &Pose<f64>) -> Values<f64> {
-        let mut q = [0.0; MAX_COORDINATES];
+    pub fn values<T: Trig>(&self, mech: &Mechanism, pose: &Pose<T>) -> Values<T> {
+        let mut q = [T::zero(); MAX_COORDINATES];
         let o = pose.o.array();
         match self {
             Set::Paper(plane) => {
@@ -153,27 +153,29 @@ impl Set {
             }
             Set::Natural(plane) => {
                 let [alpha, beta, gamma] = plane.angles(pose);
-                let middle = plane.base.transpose_mul(plane.middle(pose));
-                let h = middle.z * alpha.cos() - middle.y * alpha.sin();
+                let middle = Mat3::lift(plane.base).transpose_mul(plane.middle(pose));
+                let (s, c) = alpha.sin_cos();
+                let h = middle.z * c - middle.y * s;
                 q[..5].copy_from_slice(&[alpha, middle.x, h, beta, gamma]);
             }
             Set::Tool => {
-                let axis = pose.rotation * mech.tool_axis;
+                let axis = pose.rotation.of(mech.tool_axis);
                 let home_axis = mech.home.rotation * mech.tool_axis;
-                let turn = Mat3::shortest_turn(home_axis, axis).transpose()
+                let turn = Mat3::shortest_turn(Vec3::lift(home_axis), axis).transpose()
                     * pose.rotation
-                    * mech.home.rotation.transpose();
+                    * Mat3::lift(mech.home.rotation.transpose());
                 let across = home_axis.perpendicular();
-                let turned = turn * across;
-                q[..3].copy_from_slice(&(pose.o + pose.rotation * mech.tool_point).array());
+                let turned = turn.of(across);
+                q[..3].copy_from_slice(&(pose.o + pose.rotation.of(mech.tool_point)).array());
                 q[3..6].copy_from_slice(&axis.array());
-                q[6] = home_axis.cross(across).dot(turned).atan2(across.dot(turned));
+                let side = Vec3::lift(home_axis.cross(across));
+                q[6] = side.dot(turned).atan2(Vec3::lift(across).dot(turned));
             }
             Set::Pose => {
                 let r = pose.rotation.rows();
                 q[..3].copy_from_slice(&o);
                 q[3] = (-r[1][2]).atan2(r[2][2]);
-                q[4] = r[0][2].atan2(r[1][2].hypot(r[2][2]));
+                q[4] = r[0][2].atan2(r[1][2].mul_add(r[1][2], r[2][2] * r[2][2]).sqrt());
                 q[5] = (-r[0][1]).atan2(r[0][0]);
             }
         }
@@ -244,15 +246,15 @@ impl Plane {
     }
 
     /// From the point of L to the reference point, base axes.
-    fn middle(&self, pose: &Pose<f64>) -> Vec3<f64> {
-        pose.o + pose.rotation * self.platform_point - self.base_point
+    fn middle<T: Trig>(&self, pose: &Pose<T>) -> Vec3<T> {
+        pose.o + pose.rotation.of(self.platform_point) - Vec3::lift(self.base_point)
     }
 
     /// (α, β, γ), with α that of the half plane from L to the reference point.
-    fn angles(&self, pose: &Pose<f64>) -> [f64; 3] {
-        let middle = self.base.transpose_mul(self.middle(pose));
+    fn angles<T: Trig>(&self, pose: &Pose<T>) -> [T; 3] {
+        let middle = Mat3::lift(self.base).transpose_mul(self.middle(pose));
         let alpha = (-middle.y).atan2(middle.z);
-        let turn = self.base.transpose() * pose.rotation * self.platform;
+        let turn = Mat3::lift(self.base.transpose()) * pose.rotation * Mat3::lift(self.platform);
         let rest = Mat3::rotation_x((-alpha).sin_cos()) * turn;
         let l = rest.0[0];
         let beta = (-l.z).atan2(l.x);
@@ -311,15 +313,57 @@ pub fn state(
         (Set::Paper(plane), _) => (branch_of_gamma(plane, &mut q, branch), branch),
         _ => solve_dependent(mech, set, &mut q, given, guess),
     };
-    let pose = set.pose(mech, &q);
-    let part = |a: Vec3<Jet<f64>>, of: fn(Jet<f64>) -> f64| a.map(of);
-    let (r, o) = (pose.rotation, pose.o);
-    let platform = Motion {
-        pose: Pose { rotation: Mat3(r.0.map(|c| part(c, |j| j.x))), o: part(o, |j| j.x) },
-        twist: Twist::new(part(o, |j| j.d), half_cross(&r, |j| j.d)),
-        acceleration: Acceleration::new(part(o, |j| j.dd), half_cross(&r, |j| j.dd)),
+    State { coordinates: q, platform: motion(&set.pose(mech, &q)), branch, status }
+}
+
+/// Pose, twist and acceleration of a pose known with its rates \[T19\].
+fn motion<T: Trig>(pose: &Pose<Jet<T>>) -> Motion<T> {
+    let (r, o) = (&pose.rotation, pose.o);
+    Motion {
+        pose: Pose { rotation: Mat3(r.0.map(|c| c.map(|j| j.x))), o: o.map(|j| j.x) },
+        twist: Twist::new(o.map(|j| j.d), half_cross(r, |j| j.d)),
+        acceleration: Acceleration::new(o.map(|j| j.dd), half_cross(r, |j| j.dd)),
+    }
+}
+
+/// The numbers of the set with their rates along a motion: the inverse of [`state`].
+#[must_use]
+pub fn along(mech: &Mechanism, set: &Set, platform: &Motion<f64>) -> Values<Jet<f64>> {
+    let Motion { pose, twist, acceleration } = platform;
+    let second = acceleration.eps;
+    // [T2] with the columns of R for e: x' = ω × x, x'' = ε × x + ω × (ω × x)
+    let column = |x: Vec3<f64>| {
+        let x1 = twist.omega.cross(x);
+        jets(x, x1, second.cross(x) + twist.omega.cross(x1))
     };
-    State { coordinates: q, platform, branch, status }
+    let o = jets(pose.o, twist.v, acceleration.a);
+    set.values(mech, &Pose { rotation: Mat3(pose.rotation.0.map(column)), o })
+}
+
+fn jets(x: Vec3<f64>, d: Vec3<f64>, dd: Vec3<f64>) -> Vec3<Jet<f64>> {
+    Vec3::new(Jet::new(x.x, d.x, dd.x), Jet::new(x.y, d.y, dd.y), Jet::new(x.z, d.z, dd.z))
+}
+
+/// The motion with given coordinates that vary as duals; the others, whose values are known, follow so that the
+/// constraints are kept: by one Newton step in duals, which is exact from a solution on \[T56\]. With the pivot ratio of
+/// what determines them.
+#[must_use]
+pub fn varied(
+    mech: &Mechanism,
+    set: &Set,
+    q: &Values<Jet<Dual<f64>>>,
+    given: &[bool],
+) -> (Motion<Dual<f64>>, f64) {
+    let mut q = *q;
+    let dependent: Vec<usize> = (0..set.names().len()).filter(|&i| !given[i]).collect();
+    let residual = constraint_parts(mech, &set.pose(mech, &q), |g| -g.x);
+    let step = solve(gradient(mech, set, &q, &dependent), residual).x;
+    for (&i, s) in dependent.iter().zip(step) {
+        // The values are a solution within rounding: only their derivatives move.
+        q[i] = Jet::new(q[i].x + Dual::new(0.0, s.d), Dual::zero(), Dual::zero());
+    }
+    let (pivots, _) = follow(mech, set, &mut q, &dependent);
+    (motion(&set.pose(mech, &q)), pivots)
 }
 
 /// Whether there is a shortest turn from the tool axis at home: not to no direction, and not to the opposite one.
@@ -336,8 +380,8 @@ fn tool_turn(mech: &Mechanism, q: &Values<Jet<f64>>) -> Status {
 }
 
 /// `½ Σ x_i × x_i'` over the columns of R is ω, `½ Σ x_i × x_i''` is ε \[T19\].
-fn half_cross(r: &Mat3<Jet<f64>>, part: fn(Jet<f64>) -> f64) -> Vec3<f64> {
-    r.0.iter().map(|c| c.map(|j| j.x).cross(c.map(part))).fold(Vec3::zero(), |sum, w| sum + w) * 0.5
+fn half_cross<T: Trig>(r: &Mat3<Jet<T>>, part: fn(Jet<T>) -> T) -> Vec3<T> {
+    r.0.iter().map(|c| c.map(|j| j.x).cross(c.map(part))).fold(Vec3::zero(), |sum, w| sum + w).scale(0.5)
 }
 
 /// γ from [Eq. 5]: `γ = ± arccos(...)`, the sign being the branch.
@@ -359,7 +403,7 @@ fn branch_of_gamma(plane: &Plane, q: &mut Values<Jet<f64>>, branch: f64) -> Stat
     Status::Ok
 }
 
-type System = [f64; MAX_CONSTRAINTS];
+type System<T> = [T; MAX_CONSTRAINTS];
 
 /// Newton on the independent constraints for the coordinates that are not given, then their rates and second rates
 /// from the same matrix: `G_y y' = -ġ(y' = 0)`, `G_y y'' = -g̈(y'' = 0)` \[T23\]. Returns the sign of det G_y too: it
@@ -380,14 +424,9 @@ fn solve_dependent(
         q[i] = Jet::lit(start[i]);
     }
     let scale = mech.characteristic_length;
-    let residual = |q: &Values<Jet<f64>>| -> System {
-        let pose = set.pose(mech, &q.map(|c| c.x));
-        std::array::from_fn(|k| {
-            mech.independent.get(k).map_or(0.0, |c| constraint::value(c, &pose) / constraint::unit(c, scale))
-        })
-    };
+    let residual = |q: &Values<Jet<f64>>| constraint_parts(mech, &set.pose(mech, &q.map(|c| c.x)), |g| g);
     let size =
-        |g: &System| g.iter().fold(0.0_f64, |m, e| if e.abs() > m || e.is_nan() { e.abs() } else { m });
+        |g: &System<f64>| g.iter().fold(0.0_f64, |m, e| if e.abs() > m || e.is_nan() { e.abs() } else { m });
 
     let mut g = residual(q);
     let mut converged = false;
@@ -425,31 +464,41 @@ fn solve_dependent(
         }
         return (Status::NotConverged, f64::NAN);
     }
-    let matrix = gradient(mech, set, q, &dependent);
-    let rates = |q: &Values<Jet<f64>>, part: fn(Jet<f64>) -> f64| -> Solved<f64, [f64; MAX_CONSTRAINTS]> {
-        let pose = set.pose(mech, q);
-        let rhs = std::array::from_fn(|k| {
-            mech.independent
-                .get(k)
-                .map_or(0.0, |c| -part(constraint::value(c, &pose)) / constraint::unit(c, scale))
-        });
-        solve(matrix, rhs)
-    };
-    let first = rates(q, |j| j.d);
-    if !(first.pivots > DEPENDENT_PIVOTS) {
+    let (pivots, sign) = follow(mech, set, q, &dependent);
+    if !(pivots > DEPENDENT_PIVOTS) {
         for &i in &dependent {
             q[i] = Jet::new(q[i].x, f64::NAN, f64::NAN);
         }
         return (Status::Fold, f64::NAN);
     }
+    (Status::Ok, sign)
+}
+
+/// Rates and second rates of the dependent coordinates at known values, from one matrix: `G_y y' = -ġ(y' = 0)`,
+/// `G_y y'' = -g̈(y'' = 0)` \[T23\]. They must be zero before. With the pivot ratio and the sign of det G_y.
+fn follow<T: Trig>(mech: &Mechanism, set: &Set, q: &mut Values<Jet<T>>, dependent: &[usize]) -> (f64, f64) {
+    let matrix = gradient(mech, set, q, dependent);
+    let rates = |q: &Values<Jet<T>>, part: fn(Jet<T>) -> T| -> Solved<T, System<T>> {
+        solve(matrix, constraint_parts(mech, &set.pose(mech, q), part))
+    };
+    let first = rates(q, |g| -g.d);
     for (&i, d) in dependent.iter().zip(&first.x) {
         q[i].d = *d;
     }
-    let second = rates(q, |j| j.dd);
+    let second = rates(q, |g| -g.dd);
     for (&i, dd) in dependent.iter().zip(&second.x) {
         q[i].dd = *dd;
     }
-    (Status::Ok, first.sign)
+    (first.pivots, first.sign)
+}
+
+/// What `part` takes of the values of the independent constraints in pure numbers; zero beyond their number.
+fn constraint_parts<S: Real, T: Real>(mech: &Mechanism, pose: &Pose<S>, part: fn(S) -> T) -> System<T> {
+    std::array::from_fn(|k| {
+        mech.independent.get(k).map_or_else(T::zero, |c| {
+            part(constraint::value(c, pose)) / T::lit(constraint::unit(c, mech.characteristic_length))
+        })
+    })
 }
 
 /// Which numbers of the set to give so that the constraints determine the others best at the home pose.
@@ -480,21 +529,20 @@ fn reach(set: &Set, index: usize, scale: f64) -> f64 {
 }
 
 /// ∂g/∂y by duals, unused rows and columns those of the identity.
-fn gradient(
+fn gradient<T: Trig>(
     mech: &Mechanism,
     set: &Set,
-    q: &Values<Jet<f64>>,
+    q: &Values<Jet<T>>,
     dependent: &[usize],
-) -> [System; MAX_CONSTRAINTS] {
-    let mut matrix: [System; MAX_CONSTRAINTS] =
-        std::array::from_fn(|i| std::array::from_fn(|j| if i == j { 1.0 } else { 0.0 }));
+) -> [System<T>; MAX_CONSTRAINTS] {
+    let mut matrix: [System<T>; MAX_CONSTRAINTS] =
+        std::array::from_fn(|i| std::array::from_fn(|j| if i == j { T::one() } else { T::zero() }));
     for (column, &i) in dependent.iter().enumerate() {
-        let mut seeded = q.map(|c| Dual::new(c.x, 0.0));
-        seeded[i].d = 1.0;
-        let pose = set.pose(mech, &seeded);
-        for (row, c) in mech.independent.iter().enumerate() {
-            matrix[row][column] =
-                constraint::value(c, &pose).d / constraint::unit(c, mech.characteristic_length);
+        let mut seeded = q.map(|c| Dual::new(c.x, T::zero()));
+        seeded[i].d = T::one();
+        let derivatives = constraint_parts(mech, &set.pose(mech, &seeded), |g| g.d);
+        for row in 0..mech.independent.len() {
+            matrix[row][column] = derivatives[row];
         }
     }
     matrix

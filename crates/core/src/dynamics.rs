@@ -112,9 +112,14 @@ pub fn inverse_dynamics<T: Real>(
     platform: &Motion<T>,
     load: Wrench<T>,
 ) -> ([T; 6], T::Value) {
-    let w = resultant(mech, platform, load);
+    balancing(mech, &platform.pose, resultant(mech, platform, load))
+}
+
+/// Active forces and multipliers that balance a wrench on the platform at o, with the pivot ratio of J \[T15\].
+#[inline(always)]
+pub fn balancing<T: Real>(mech: &Mechanism, pose: &Pose<T>, w: Wrench<T>) -> ([T; 6], T::Value) {
     let scaled = Wrench::new(w.force, w.torque * T::lit(1.0 / mech.characteristic_length));
-    let solved = solve(transposed(&scaled_jacobian(mech, &platform.pose)), scaled.array().map(|x| -x));
+    let solved = solve(transposed(&scaled_jacobian(mech, pose)), scaled.array().map(|x| -x));
     (solved.x, solved.pivots)
 }
 

@@ -4,17 +4,20 @@
 //! a novel 5-DoF parallel manipulator with couple-constrained wrench"; `[T6]` one of `docs/theory.md`.
 
 pub mod assembly;
+pub mod base_parameters;
 pub mod batch;
 pub mod chart;
 pub mod clearance;
 pub mod complex;
 pub mod constraint;
 pub mod coordinates;
+pub mod derivatives;
 mod draw;
 pub mod dynamics;
 pub mod forward;
 pub mod forward_dynamics;
 pub mod forward_lanes;
+pub mod inertial;
 pub mod jacobian;
 pub mod joints;
 pub mod lanes;
@@ -36,6 +39,7 @@ pub mod singularity;
 pub mod spatial;
 pub mod spec;
 pub mod status;
+mod svd;
 pub mod workspace;
 
 // The tests of the modules use the mechanisms of the other tests.

@@ -12,6 +12,7 @@ use crate::mechanism::{
 };
 use crate::spatial::{Mat3, Pose, Vec3, Wrench};
 use crate::spec::JointKind;
+use crate::svd::Svd;
 use nalgebra::{DMatrix, DVector};
 
 /// Singular values below this share of the largest count as zero.
@@ -116,12 +117,10 @@ pub fn project(constraints: &[Constraint], size: f64, start: &Pose<f64>) -> Opti
         let g = scaled_rows(&rows, &sizes, size);
         // Off the constraints redundant rows disagree; a damping of the order of the residual (Levenberg and Marquardt)
         // keeps their disagreement from being followed and vanishes with it.
-        let svd = g.svd(true, true);
-        let (u, vt, damping) = (svd.u?, svd.v_t?, residual.amax() / size);
-        let floor = svd.singular_values.max() * RANK_TOLERANCE;
+        let (Svd { values, u, v_t }, damping) = (Svd::of(&g)?, residual.amax() / size);
+        let floor = values.max() * RANK_TOLERANCE;
         let damped = |s: f64| if s > floor { s / (s * s + damping * damping) } else { 0.0 };
-        let step =
-            vt.transpose() * svd.singular_values.map(damped).component_mul(&(u.transpose() * &residual));
+        let step = v_t.transpose() * values.map(damped).component_mul(&(u.transpose() * &residual));
         let [x, y, z, p, q, r]: [f64; 6] = std::array::from_fn(|i| -step[i]);
         pose.o = pose.o + Vec3::new(x, y, z);
         pose.rotation = Mat3::from_rotation_vector(Vec3::new(p, q, r) * (1.0 / size)) * pose.rotation;
@@ -165,12 +164,7 @@ fn independent_rows(mech: &Mechanism, poses: &[Pose<f64>]) -> Vec<usize> {
 }
 
 fn rank_of(m: &DMatrix<f64>) -> usize {
-    if m.nrows() == 0 {
-        return 0;
-    }
-    let values = m.singular_values();
-    let floor = values.max() * RANK_TOLERANCE;
-    values.iter().filter(|&&s| s > floor).count()
+    Svd::of(m).map_or(0, |svd| svd.rank(RANK_TOLERANCE))
 }
 
 /// Freedoms that are left when the actuated legs keep their lengths, at a pose.
@@ -226,11 +220,9 @@ fn closure(mech: &Mechanism, pose: &Pose<f64>) -> Closure {
     let joints = own + mech.rods.len();
     let passive = joints - rank_of(&m.columns(0, joints).into_owned());
     // Left null vectors are sets of leg wrenches, each unfelt by its own joints, that cancel on the platform.
-    let svd = m.svd(true, false);
-    let floor = svd.singular_values.max() * RANK_TOLERANCE;
-    let rank = svd.singular_values.iter().filter(|&&s| s > floor).count();
-    let span = svd.u.map(|u| u.columns(0, rank).into_owned());
-    let felt = |row: usize| span.as_ref().map_or(1.0, |u| u.row(row).norm_squared());
+    let svd = Svd::of(&m);
+    let rank = svd.as_ref().map_or(0, |svd| svd.rank(RANK_TOLERANCE));
+    let felt = |row: usize| svd.as_ref().map_or(1.0, |svd| svd.u.row(row).columns(0, rank).norm_squared());
     let redundant_legs =
         (0..legs.len()).filter(|&leg| (0..6).any(|k| 1.0 - felt(6 * leg + k) > 1e-6)).collect();
     Closure { rank, passive, redundant_legs, passive_legs }

@@ -12,6 +12,7 @@ use crate::mechanism::{ConstraintKind, Leg, Mechanism};
 use crate::real::Real;
 use crate::spatial::{Mat3, Motion, Pose, Vec3, Wrench};
 use crate::spec::JointKind;
+use crate::svd::Svd;
 
 /// Singular value of the balances, as a share of the largest, below which the pose is singular.
 const SINGULAR: f64 = 1e-12;
@@ -324,13 +325,10 @@ impl Balance<'_> {
         if columns.iter().flatten().chain(&given).any(|e| !e.is_finite()) {
             return None;
         }
-        // Rows of zeros make room for the whole null space.
-        let rows = given.len().max(unknowns);
-        let m = DMatrix::from_fn(rows, unknowns, |i, k| columns[k].get(i).copied().unwrap_or(0.0));
-        let rhs = DVector::from_fn(rows, |i, _| given.get(i).map_or(0.0, |g| -g));
+        let m = DMatrix::from_fn(given.len(), unknowns, |i, k| columns[k][i]);
+        let rhs = -DVector::from_vec(given);
 
-        let svd = m.clone().svd(true, true);
-        let (u, v_t, sigma) = (svd.u?, svd.v_t?, svd.singular_values);
+        let Svd { values: sigma, u, v_t } = Svd::of(&m)?;
         // The rank is that of generic poses [T18]: less is singular, and more is an error of the pose.
         let rank = unknowns - self.mech.mobility.redundant;
         let (least, largest_zero) = (sigma[rank - 1], sigma.get(rank).copied().unwrap_or(0.0));
@@ -385,9 +383,8 @@ fn choose(
     let mut open = DMatrix::identity(stresses.len(), stresses.len());
     for measure in measures {
         let (now, parts) = (measure(&chosen), stresses.iter().map(|s| measure(s)).collect::<Vec<_>>());
-        let rows = now.len().max(open.ncols());
-        let seen = DMatrix::from_fn(rows, stresses.len(), |i, k| parts[k].get(i).copied().unwrap_or(0.0));
-        let excess = DVector::from_fn(rows, |i, _| now.get(i).copied().unwrap_or(0.0));
+        let seen = DMatrix::from_fn(now.len(), stresses.len(), |i, k| parts[k][i]);
+        let excess = DVector::from_vec(now);
         let Some((step, unseen)) = least_squares(&(seen * &open), &excess) else { break };
         for (share, stress) in (&open * step).iter().zip(stresses) {
             for (reaction, part) in chosen.iter_mut().zip(stress) {
@@ -400,13 +397,12 @@ fn choose(
 }
 
 /// The least x with the least `|m x - b|`, and an orthonormal basis of what m takes to zero; none where there are no
-/// unknowns. Needs as many rows as columns.
+/// unknowns.
 fn least_squares(m: &DMatrix<f64>, b: &DVector<f64>) -> Option<(DVector<f64>, DMatrix<f64>)> {
     if m.ncols() == 0 {
         return None;
     }
-    let svd = m.clone().svd(true, true);
-    let (u, v_t, sigma) = (svd.u?, svd.v_t?, svd.singular_values);
+    let Svd { values: sigma, u, v_t } = Svd::of(m)?;
     let rank = sigma.iter().filter(|&&s| s > OPEN).count();
     let mut x = DVector::zeros(m.ncols());
     for k in 0..rank {

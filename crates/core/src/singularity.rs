@@ -1,7 +1,7 @@
 //! What a pose has of a singularity: determinant, singular values, the kind, and the twist that nothing controls
 //! \[T24\] \[T30\]-\[T33\].
 
-use nalgebra::{DMatrix, RowDVector};
+use nalgebra::{DMatrix, DVector};
 
 use crate::constraint;
 use crate::jacobian::Matrix6;
@@ -10,6 +10,7 @@ use crate::linear;
 use crate::mechanism::{Constraint, Mechanism};
 use crate::real::{Dual, Real};
 use crate::spatial::{Pose, Twist, Vec3, Wrench};
+use crate::svd::Svd;
 
 /// A singular value, a row's size, a leg's length or its sine (all pure numbers) counts as zero up to this much: poses
 /// may miss their constraints by as much of the characteristic length.
@@ -149,26 +150,15 @@ pub fn determinant(mech: &Mechanism, pose: &Pose<f64>, twist: &Twist<f64>, scale
 /// The smallest singular value of J in pure numbers; NaN where an actuated leg has no direction.
 #[must_use]
 pub fn smallest(mech: &Mechanism, pose: &Pose<f64>, scale: f64) -> f64 {
-    Svd::of(&pure_jacobian(mech, pose, scale)).values[5]
+    values_and_vectors(&pure_jacobian(mech, pose, scale)).0[5]
 }
 
-/// Singular values, largest first, at least six, and the right singular vectors of rows of six.
-struct Svd {
-    values: Vec<f64>,
-    vectors: DMatrix<f64>,
-}
-
-impl Svd {
-    fn of(rows: &[[f64; 6]]) -> Self {
-        let height = rows.len().max(6);
-        if rows.iter().flatten().any(|e| !e.is_finite()) {
-            return Svd { values: vec![f64::NAN; height], vectors: DMatrix::from_element(6, 6, f64::NAN) };
-        }
-        let m = DMatrix::from_fn(height, 6, |i, j| rows.get(i).map_or(0.0, |row| row[j]));
-        let svd = m.svd(false, true);
-        let vectors = svd.v_t.unwrap_or_else(|| DMatrix::from_element(6, 6, f64::NAN));
-        Svd { values: svd.singular_values.iter().copied().collect(), vectors }
-    }
+/// Singular values, largest first, and right singular vectors of rows of six; NaN if an entry is.
+fn values_and_vectors(rows: &[[f64; 6]]) -> (DVector<f64>, DMatrix<f64>) {
+    Svd::of(&DMatrix::from_fn(rows.len(), 6, |i, j| rows[i][j])).map_or_else(
+        || (DVector::from_element(6, f64::NAN), DMatrix::from_element(6, 6, f64::NAN)),
+        |svd| (svd.values, svd.v_t),
+    )
 }
 
 /// The twists that the constraints allow at a pose, from all of their rows \[T31\].
@@ -183,12 +173,12 @@ struct Allowed {
 
 fn allowed(mech: &Mechanism, pose: &Pose<f64>, scale: f64, tolerance: f64) -> Allowed {
     let rows: Vec<[f64; 6]> = mech.constraints.iter().map(|c| constraint_row(c, pose, scale)).collect();
-    let (svd, generic) = (Svd::of(&rows), 6 - mech.dof());
-    let rank = svd.values[..generic].iter().filter(|&&s| !(s <= tolerance)).count();
+    let ((values, vectors), generic) = (values_and_vectors(&rows), 6 - mech.dof());
+    let rank = values.iter().take(generic).filter(|&&s| !(s <= tolerance)).count();
     Allowed {
-        sigma: if generic == 0 { f64::INFINITY } else { svd.values[generic - 1] },
+        sigma: if generic == 0 { f64::INFINITY } else { values[generic - 1] },
         lost: rank < generic,
-        basis: svd.vectors.rows(rank, 6 - rank).into_owned(),
+        basis: vectors.rows(rank, 6 - rank).into_owned(),
     }
 }
 
@@ -198,20 +188,19 @@ fn leg_values(mech: &Mechanism, pose: &Pose<f64>, scale: f64, allowed: &Allowed)
     let freedoms = allowed.basis.nrows();
     let has_direction = |leg: &leg::Position<f64>| leg.length > TOLERANCE * scale;
     let legs: Vec<_> = mech.actuated().map(|(_, leg)| leg::position(leg, pose)).collect();
-    if !legs.iter().all(has_direction) || allowed.basis.iter().any(|e| !e.is_finite()) {
-        return (vec![f64::NAN; freedoms], Twist::from_array([f64::NAN; 6]));
+    let nothing = (vec![f64::NAN; freedoms], Twist::from_array([f64::NAN; 6]));
+    if !legs.iter().all(has_direction) {
+        return nothing;
     }
     let rows: Vec<[f64; 6]> = legs.iter().map(|p| pure_row(leg::row(p), scale)).collect();
     let legs = DMatrix::from_fn(rows.len(), 6, |i, j| rows[i][j]);
-    // Where a constraint is lost there are fewer legs than freedoms: rows of zeros stand for the legs that lack.
-    let reduced = (legs * allowed.basis.transpose()).resize_vertically(freedoms, 0.0);
-    let svd = reduced.svd(false, true);
-    let least = svd.v_t.map_or_else(|| RowDVector::zeros(freedoms), |v| v.row(freedoms - 1).into_owned());
-    let twist = least * &allowed.basis;
+    // Where a constraint is lost there are fewer legs than freedoms, so that the last values are zero.
+    let Some(svd) = Svd::of(&(legs * allowed.basis.transpose())) else { return nothing };
+    let twist = svd.v_t.row(freedoms - 1) * &allowed.basis;
     // One of two opposite twists: the one whose largest entry is positive.
     let sign = twist.iter().fold(0.0_f64, |m, &e| if e.abs() > m.abs() { e } else { m }).signum();
     let entry = |i: usize| sign * twist[i] / if i < 3 { 1.0 } else { scale };
-    (svd.singular_values.iter().copied().collect(), Twist::from_array(std::array::from_fn(entry)))
+    (svd.values.iter().copied().collect(), Twist::from_array(std::array::from_fn(entry)))
 }
 
 /// The singular values at a pose \[T24\]; NaN where an actuated leg has no direction.
@@ -273,7 +262,7 @@ pub fn singularity(mech: &Mechanism, pose: &Pose<f64>, scale: f64, tolerance: f6
 /// The smallest singular value of the constraints' rows in J; infinite without any.
 fn smallest_of_chosen(mech: &Mechanism, pose: &Pose<f64>, scale: f64) -> f64 {
     let rows: Vec<[f64; 6]> = mech.independent.iter().map(|c| constraint_row(c, pose, scale)).collect();
-    if rows.is_empty() { f64::INFINITY } else { Svd::of(&rows).values[rows.len() - 1] }
+    if rows.is_empty() { f64::INFINITY } else { values_and_vectors(&rows).0[rows.len() - 1] }
 }
 
 /// The screw of a twist of o \[T33\].

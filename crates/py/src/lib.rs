@@ -3,6 +3,7 @@
 // Arguments arrive from Python by value.
 #![allow(clippy::needless_pass_by_value)]
 
+mod derivatives;
 mod simulation;
 mod workspace;
 
@@ -551,6 +552,10 @@ fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add("__version__", env!("CARGO_PKG_VERSION"))?;
     m.add("Faults", m.py().get_type::<Faults>())?;
     m.add_class::<PyMechanism>()?;
+    m.add_function(wrap_pyfunction!(derivatives::inverse_dynamics_derivatives, m)?)?;
+    m.add_function(wrap_pyfunction!(derivatives::regressor, m)?)?;
+    m.add_function(wrap_pyfunction!(derivatives::inertial_parameters, m)?)?;
+    m.add_function(wrap_pyfunction!(derivatives::base_parameters, m)?)?;
     m.add_function(wrap_pyfunction!(workspace::fit_poses, m)?)?;
     m.add_class::<simulation::PyChart>()?;
     m.add_class::<workspace::PyFlood>()?;

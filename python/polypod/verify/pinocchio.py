@@ -1,7 +1,7 @@
 """The mechanism in Pinocchio: every link, all joints solved, the tree's inverse dynamics on allowed motions.
 
 Pinocchio gives positions, velocities, accelerations and Jacobians of frames, and the generalised forces of
-the tree; what the loops add is here, in terms of those alone [T57]-[T59].
+the tree; what the loops add is here, in terms of those alone [T60]-[T62].
 """
 
 from __future__ import annotations
@@ -134,7 +134,7 @@ class Tree:
         return np.asarray(self.data.oMf[self.frames[body]].rotation)
 
     def residual(self) -> Array:
-        """Errors of the closures, pure numbers: distances of points over the scale, cosines [T56]."""
+        """Errors of the closures, pure numbers: distances of points over the scale, cosines [T59]."""
         rows = []
         for closure, ends in zip(self.tree.closures, self.ends, strict=True):
             if ends:
@@ -145,7 +145,7 @@ class Tree:
         return np.concatenate(rows)
 
     def jacobian(self) -> Array:
-        """Of `residual` by the velocities, in pure numbers, from the Jacobians of frames [T57]."""
+        """Of `residual` by the velocities, in pure numbers, from the Jacobians of frames [T60]."""
         rows = []
         for closure, ends in zip(self.tree.closures, self.ends, strict=True):
             if ends:
@@ -161,7 +161,7 @@ class Tree:
         return np.asarray(pin.getFrameJacobian(self.model, self.data, frame, _AXES))
 
     def close(self, q: Array) -> tuple[Array, Array, float, int]:
-        """Configuration with the platform kept and all closures satisfied, by Gauss-Newton steps [T57].
+        """Configuration with the platform kept and all closures satisfied, by Gauss-Newton steps [T60].
 
         Also the closures' Jacobian there, the largest error left, and the number of steps.
         """
@@ -181,7 +181,7 @@ class Tree:
     # --- velocities and accelerations --------------------------------------------------------------------
 
     def move(self, q: Array, pose: Array, twist: Array, acceleration: Array) -> Moved:
-        """The motion of all joints that goes with that of the platform [T57]."""
+        """The motion of all joints that goes with that of the platform [T60]."""
         q, jacobian, worst, steps = self.close(q)
         status = Status.OK if worst <= CLOSED else Status.NOT_CONVERGED
         # The floating joint has the platform's own axes, and the acceleration of its frame, not of its point.
@@ -242,7 +242,7 @@ class Tree:
         pin.updateFramePlacements(self.model, self.data)
 
     def required(self, moved: Moved, twist: Array, wrench: Array) -> Array:
-        """(nv,): generalised forces that keep up the motion under a load (6,) at o in base axes [T58]."""
+        """(nv,): generalised forces that keep up the motion under a load (6,) at o in base axes [T61]."""
         geometry = self.tree.geometry
         force = np.array(pin.rnea(self.model, self.data, moved.q, moved.v, moved.a))
         damping = np.repeat([geometry["linear_damping"], geometry["angular_damping"]], 3)
@@ -272,7 +272,7 @@ def _least(matrix: Array, right: Array) -> Array:
 
 
 class Twin:
-    """The mechanism, and the same with its platform set free, for the constraint forces [T59]."""
+    """The mechanism, and the same with its platform set free, for the constraint forces [T62]."""
 
     version: str = pin.__version__
 
@@ -339,7 +339,7 @@ class Twin:
         }
 
     def _forces(self, moved: Moved, twist: Array, wrench: Array) -> tuple[Array, int, Status]:
-        """Forces of the prismatic joints that do the work of all others on all allowed motions [T58].
+        """Forces of the prismatic joints that do the work of all others on all allowed motions [T61].
 
         Also the number of allowed motions, and whether they determine the forces.
         """
@@ -358,7 +358,7 @@ class Twin:
     def _constraint_wrench(
         self, moved: Moved, forces: Array, pose: Array, twist: Array, wrench: Array
     ) -> Array:
-        """(6,): what the constraints do on the platform, at o in base axes, legs continued off them [T59]."""
+        """(6,): what the constraints do on the platform, at o in base axes, legs continued off them [T62]."""
         tree = self.free
         tree.set(moved)
         required = tree.required(moved, twist, wrench)

@@ -2,7 +2,7 @@
 
 Made from the mechanism file's numbers and what the file's format says of them, without Polypod's equations
 of motion. Every leg hangs on the base or on its rod, the platform floats, and the platform joints close the
-loops [T56].
+loops [T59].
 """
 
 from __future__ import annotations
@@ -114,7 +114,7 @@ class Multibody:
 
 
 def describe(mech: Mechanism) -> Multibody:
-    """The mechanism as bodies, joints and closures [T56]."""
+    """The mechanism as bodies, joints and closures [T59]."""
     geometry = mech.geometry
     zero = placements(geometry, mech.home, zero=True)
     bodies, closures, parts = _rods(geometry, zero), [], []
@@ -143,7 +143,7 @@ def describe(mech: Mechanism) -> Multibody:
 
 
 def release(tree: Multibody) -> Multibody:
-    """The same bodies with the platform set free: how they move off the constraints, by convention [T59].
+    """The same bodies with the platform set free: how they move off the constraints, by convention [T62].
 
     Each leg follows its point of the platform and turns by the joint that keeps it from spinning, the base
     joint if it does; a rod follows the first leg that it carries.

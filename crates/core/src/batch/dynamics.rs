@@ -6,7 +6,7 @@ use crate::dynamics;
 use crate::leg;
 use crate::mechanism::Mechanism;
 use crate::mobility;
-use crate::real::Dual;
+use crate::real::{Dual, Real};
 use crate::spatial::{Motion, Pose, Twist, Wrench};
 use crate::spec::Axes;
 use crate::status::Status;
@@ -19,13 +19,12 @@ pub enum Loads<'a> {
 }
 
 impl Loads<'_> {
-    pub(super) fn at(&self, mech: &Mechanism, pose: &Pose<f64>, i: usize) -> Wrench<f64> {
-        match self {
-            Loads::Own => dynamics::load_in_base(mech.load.wrench, mech.load.axes, pose),
-            Loads::Given(values, axes) => {
-                dynamics::load_in_base(Wrench::from_array(six(values, i)), *axes, pose)
-            }
-        }
+    pub(super) fn at<T: Real>(&self, mech: &Mechanism, pose: &Pose<T>, i: usize) -> Wrench<T> {
+        let (wrench, axes) = match self {
+            Loads::Own => (mech.load.wrench, mech.load.axes),
+            Loads::Given(values, axes) => (Wrench::from_array(six(values, i)), *axes),
+        };
+        dynamics::load_in_base(Wrench::from_array(wrench.array().map(T::lit)), axes, pose)
     }
 }
 

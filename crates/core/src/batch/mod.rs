@@ -2,6 +2,7 @@
 
 mod checks;
 mod coordinates;
+mod derivatives;
 mod dynamics;
 mod forward;
 mod forward_dynamics;
@@ -12,6 +13,7 @@ mod singularity;
 
 pub use checks::{CONSTRAINT_TOLERANCE, SINGULAR_PIVOTS};
 pub use coordinates::{Coordinates, coordinate_values, states};
+pub use derivatives::{inverse_dynamics_derivatives, regressors};
 pub use dynamics::{Loads, coupled_forces, inverse_dynamics, power};
 pub use forward::{AllModes, assembly_modes, forward_kinematics};
 pub use forward_dynamics::{Space, equations_of_motion, forward_dynamics};

@@ -1,0 +1,118 @@
+"""Derivatives of inverse dynamics, the regressor, and the inertial parameters that forces can tell apart.
+
+The shapes are written with n legs, k multipliers, m coordinates, p parameters, b base parameters.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Codes = NDArray[np.uint8]
+
+
+class InverseDynamicsDerivatives(NamedTuple):
+    """Exact derivatives of active forces and multipliers [T56, T57]; the last axis is what is varied.
+
+    By pose: m for a move of o, rad for a turn about axes of the base through o, whose components twist and
+    acceleration keep. On a mechanism with constraints only changes that keep them have a meaning: of pose,
+    twist and acceleration together. Those by coordinates keep them. Forces are in N (multipliers of kind D:
+    N m); each derivative is in that unit by the unit of what is varied.
+    """
+
+    coordinates: tuple[str, ...]
+    """Names of the m coordinates that are varied; dependent ones follow."""
+    bodies: tuple[str, ...]
+    """Names of the p numbers of the bodies, such as "piston 1 center_y": in the axes of the link, inertia
+    about the mass centre. Where a leg spins freely only those of a body symmetric about it."""
+    forces_by_pose: Array
+    """(..., n, 6), N/m and N/rad."""
+    constraint_by_pose: Array
+    """(..., k, 6)."""
+    forces_by_twist: Array
+    """(..., n, 6), N s/m and N s/rad."""
+    constraint_by_twist: Array
+    """(..., k, 6)."""
+    forces_by_acceleration: Array
+    """(..., n, 6), N s^2/m and N s^2/rad."""
+    constraint_by_acceleration: Array
+    """(..., k, 6)."""
+    forces_by_coordinates: Array
+    """(..., n, m): rates and second rates of these coordinates kept; NaN where the status is FOLD."""
+    constraint_by_coordinates: Array
+    """(..., k, m)."""
+    forces_by_rates: Array
+    """(..., n, m): coordinates and second rates kept."""
+    constraint_by_rates: Array
+    """(..., k, m)."""
+    forces_by_second_rates: Array
+    """(..., n, m): the rows of the actuated legs are the mass matrix as their actuators feel it."""
+    constraint_by_second_rates: Array
+    """(..., k, m)."""
+    forces_by_bodies: Array
+    """(..., n, p), N/kg, N/m and N/(kg m^2)."""
+    constraint_by_bodies: Array
+    """(..., k, p)."""
+    status: Codes
+    """FOLD where the coordinates do not determine the motion: all other derivatives stand."""
+
+
+class Regressor(NamedTuple):
+    """Active forces and multipliers as linear functions of the inertial parameters [T57].
+
+    `inverse_dynamics(...).forces` is `forces @ values + forces_offset`, and so for `constraint`.
+    """
+
+    names: tuple[str, ...]
+    """Names of the p parameters, such as "piston 1 mc_y": mass, first moments and inertia about the origin of
+    the link's axes, which is o, B, b or the rod's point. For a leg that spins freely only m, mc_y,
+    I_xx = I_zz and I_yy of a body symmetric about it."""
+    values: Array
+    """(p,): their values in the mechanism file; kg, kg m, kg m^2."""
+    forces: Array
+    """(..., n, p): Y, zero for passive legs; N/kg, N/(kg m), N/(kg m^2)."""
+    constraint: Array
+    """(..., k, p): the same for the multipliers."""
+    forces_offset: Array
+    """(..., n): forces of load and damping alone, N."""
+    constraint_offset: Array
+    """(..., k)."""
+    status: Codes
+
+
+@dataclass(frozen=True)
+class BaseParameters:
+    """The minimal set of inertial parameters: combinations that active forces can tell apart [T58].
+
+    With the regressor's names, values and columns: `forces[..., columns] @ values` are the forces of all
+    parameters, whatever the motion.
+    """
+
+    names: tuple[str, ...]
+    """Names of the b parameters that are kept, in the order of the regressor's."""
+    columns: NDArray[np.int64]
+    """(b,): their places in the regressor."""
+    combination: Array
+    """(b, p): `combination @ regressor.values` are the base parameters; the identity on `columns`."""
+    values: Array
+    """(b,): the base parameters of the mechanism file; units as of their names."""
+    parameters: tuple[str, ...]
+    """Names of all p parameters."""
+    remainders: Array
+    """(p,): what is left of each parameter's column after the ones kept before it, as a part of itself: 0
+    where it is dependent. How clear the rank is shows in the gap between both kinds."""
+
+    def expression(self, index: int, digits: int = 4) -> str:
+        """A base parameter as a sum of parameters by name, such as "platform mc_x + 0.14 piston 1 m"."""
+        terms = []
+        kept = self.columns[index]
+        for j in [kept, *(j for j in np.flatnonzero(self.combination[index]) if j != kept)]:
+            factor, name = self.combination[index, j], self.parameters[j]
+            size = f"{abs(factor):.{digits}g}"
+            size = "" if size == "1" else f"{size} "
+            terms.append(f"{'-' if factor < 0 else '+'} {size}{name}")
+        return " ".join(terms).removeprefix("+ ")
