@@ -160,6 +160,30 @@ def test_legs_without_mass(name, some, engine):
     assert found.agrees, (found.comparisons[0].without_answer, exceeding(found))
 
 
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("size", [1e-2, 1e2])
+def test_of_any_size(size, engine):
+    """Engines have smallest numbers of their own; a platform of 12 mg and 6 mm is as good as one of 12 kg."""
+    tables = without_masses(cases.case("stewart-gough").mech, [(0, "cylinder"), (0, "piston")]).to_dict()
+    del tables["published"]
+    tables["home"]["position"][2] *= size
+    for leg in tables["legs"]:
+        del leg["stroke"], leg["radius"]
+        for joint in (leg["base"], leg["platform"]):
+            joint["point"]["radius"] *= size
+    for body in (
+        tables["platform"],
+        *(leg[k] for leg in tables["legs"] for k in ("cylinder", "piston") if k in leg),
+    ):
+        body["mass"] *= size**3
+        body["center"] = (size * np.array(body["center"])).tolist()
+        body["inertia"] = (size**5 * np.array(body["inertia"])).tolist()
+    mech = pp.Mechanism.from_dict(tables)
+    motion = np.array([[size, size, size, 1.0, 1.0, 1.0]])
+    found = verify_states(mech, mech.home[None], 0.1 * motion, motion, engines=[engine])
+    assert found.agrees, (found.comparisons[0].without_answer, exceeding(found))
+
+
 def test_a_system_that_exudyn_finds_singular_has_no_answer(monkeypatch, capfd):
     """It goes on with accelerations of zero and a warning."""
     case = cases.case("6-sps")
@@ -385,6 +409,20 @@ def test_command_with_integration(run, tmp_path):
     assert "left at step zero" in out
     status, out, _ = run("verify", LU, motion, *args, "--json")
     assert json.loads(out)["integration"]["agrees"]
+
+
+def test_samples_are_for_the_comparison(run, monkeypatch):
+    """What is integrated is all of the motion."""
+    seen = []
+    right = pp.verify.integrate
+
+    def spy(mech, motion, **options):
+        seen.append(len(motion.time))
+        return right(mech, motion.sample([0.0, 0.05, 0.1]), **options)
+
+    monkeypatch.setattr(pp.verify, "integrate", spy)
+    run("verify", LU, LU, "--engine", "exudyn", "--integrate", "--samples", "2")
+    assert seen == [len(pp.load_motion(LU, pp.load(LU)).time)]
 
 
 @pytest.mark.parametrize(("engine", "title"), [("exudyn", "Exudyn"), ("mujoco", "MuJoCo")])

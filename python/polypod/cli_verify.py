@@ -56,12 +56,13 @@ def verify(
 
     mech = load(mechanism)
     path = load_motion(motion, mech)
+    compared = path
     if samples is not None:
-        path = path.sample(np.linspace(path.time[0], path.time[-1], samples))
-    with _bar("comparing", len(path.time)) as progress:
+        compared = path.sample(np.linspace(path.time[0], path.time[-1], samples))
+    with _bar("comparing", len(compared.time)) as progress:
         found = verify_motion(
             mech,
-            path,
+            compared,
             engine or ("pinocchio",),
             TOLERANCE if tolerance is None else tolerance,
             progress=progress,

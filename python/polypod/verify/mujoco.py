@@ -43,8 +43,18 @@ STEP = 1e-4
 """s."""
 
 
+def unit_of_mass(tree: Multibody) -> float:
+    """The mass that is 1 in the model, kg: the platform's moment of inertia is about 1 by it.
+
+    MuJoCo takes moments of inertia below 1e-14 for zero.
+    """
+    return next(body.mass for body in tree.bodies if body.name == PLATFORM) * tree.scale**2
+
+
 def mjcf(tree: Multibody, constraint: dict[str, str] | None = None) -> str:
     """The mechanism as a model file for MuJoCo: a tree of bodies, and an equality for each closure [T64].
+
+    Masses, and so forces, are in `unit_of_mass`.
 
     Args:
         tree: the mechanism.
@@ -132,15 +142,14 @@ def _cross(parent: Any, tree: Multibody, name: str, cross: Cross) -> Any:
     """The cross of a universal joint, a body of hardly any mass."""
     node = ElementTree.SubElement(parent, "body", name=name, pos=_text(cross.origin))
     _joint(node, f"{name} 0", Freedom("revolute", cross.hinge))
-    _inertial(node, POINT, *light(tree))
+    _inertial(node, tree, POINT, *light(tree))
     return node
 
 
-def _inertial(node: Any, center: Array, mass: float, inertia: Array) -> None:
-    six = [*np.diag(inertia), inertia[0, 1], inertia[0, 2], inertia[1, 2]]
-    ElementTree.SubElement(
-        node, "inertial", pos=_text(center), mass=repr(float(mass)), fullinertia=_text(six)
-    )
+def _inertial(node: Any, tree: Multibody, center: Array, mass: float, inertia: Array) -> None:
+    numbers = np.array([mass, *np.diag(inertia), inertia[0, 1], inertia[0, 2], inertia[1, 2]])
+    mass, *six = (numbers / unit_of_mass(tree)).tolist()
+    ElementTree.SubElement(node, "inertial", pos=_text(center), mass=repr(mass), fullinertia=_text(six))
 
 
 def _body(parent: Any, tree: Multibody, body: Body, place: Array) -> Any:
@@ -149,7 +158,7 @@ def _body(parent: Any, tree: Multibody, body: Body, place: Array) -> Any:
     )
     for i, freedom in enumerate(body.freedoms):
         _joint(node, f"{body.name} {i}", freedom)
-    _inertial(node, body.center, *(inertial(tree, body) if body.mass > 0.0 else light(tree)))
+    _inertial(node, tree, body.center, *(inertial(tree, body) if body.mass > 0.0 else light(tree)))
     return node
 
 
@@ -184,7 +193,7 @@ class Model:
     """A compiled model, by default with MuJoCo's own constraints."""
 
     def __init__(self, tree: Multibody, constraint: dict[str, str] | None = None) -> None:
-        self.tree = tree
+        self.tree, self.unit = tree, unit_of_mass(tree)
         self._crosses = [(c, t) for c in tree.closures if (t := _ties(tree, c).cross) is not None]
         self.model = mujoco.MjModel.from_xml_string(mjcf(tree, constraint))
         self.data = mujoco.MjData(self.model)
@@ -198,7 +207,7 @@ class Model:
                 number = self._bodies[body.name]
                 # A sphere to the compiler, which may have chosen any axes.
                 self.model.body_iquat[number] = [1.0, 0.0, 0.0, 0.0]
-                self.model.body_inertia[number] = np.diag(inertial(self.tree, body)[1])
+                self.model.body_inertia[number] = np.diag(inertial(self.tree, body)[1]) / self.unit
 
     def hold_evenly(self) -> None:
         """All constraints give way alike, see `EVEN`."""
@@ -209,11 +218,11 @@ class Model:
         model, data = self.model, self.data
         mujoco.mj_resetData(model, data)
         self._put(start)
-        geometry, share = self.tree.geometry, 1.0 / self.tree.geometry["efficiency"]
+        geometry = self.tree.geometry
         for leg, force in zip(self.tree.legs, forces, strict=True):
-            data.qfrc_applied[self._joint(leg.piston, 0).dofadr[0]] = force
+            data.qfrc_applied[self._joint(leg.piston, 0).dofadr[0]] = force / self.unit
         damping = np.repeat([geometry["linear_damping"], geometry["angular_damping"]], 3)
-        pull = share * (wrench - damping * twist)
+        pull = (wrench - damping * twist) / (geometry["efficiency"] * self.unit)
         point = start.placements[PLATFORM][:3, 3]
         mujoco.mj_applyFT(model, data, pull[:3], pull[3:], point, self._bodies[PLATFORM], data.qfrc_applied)
         while True:
