@@ -137,11 +137,11 @@ class System:
         """A generic joint that has one constraint alone."""
         if isinstance(row, Slide):
             # The displacement along the first marker's x.
-            axes, which = (_frame(row.axis, 0), np.eye(3)), 0
+            axes, which = (_axis_in_column(row.axis, 0), np.eye(3)), 0
             points = row.points
         else:
             # Its first turn keeps y of the first marker square to z of the second.
-            axes, which = (_frame(row.axes[0], 1), _frame(row.axes[1], 2)), 3
+            axes, which = (_axis_in_column(row.axes[0], 1), _axis_in_column(row.axes[1], 2)), 3
             points = (POINT, POINT)
         markers = [self._marker(body, *at) for body, *at in zip(row.bodies, axes, points, strict=True)]
         constrained = [int(i == which) for i in range(6)]
@@ -258,7 +258,7 @@ def _distance(placed: Placements, leg: Any) -> float:
     return float(np.linalg.norm(placed[leg.piston][:3, 3] - placed[leg.cylinder][:3, 3]))
 
 
-def _frame(axis: Array, column: int) -> Array:
+def _axis_in_column(axis: Array, column: int) -> Array:
     """(3, 3): a rotation with a unit axis in a column."""
     return np.roll(np.column_stack([axis, *across(axis)]), column, axis=1)
 

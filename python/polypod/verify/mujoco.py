@@ -67,9 +67,9 @@ def mjcf(tree: Multibody, constraint: dict[str, str] | None = None) -> str:
         root, "option", flags | {"solver": "Newton", "jacobian": "dense", "tolerance": "0"}
     )
     nodes = {BASE: ElementTree.SubElement(root, "worldbody")}
-    zero = {BASE: np.eye(4)} | {body.name: body.zero for body in tree.bodies}
     for body in tree.bodies:
-        nodes[body.name] = _body(nodes[body.parent], tree, body, inverse(zero[body.parent]) @ body.zero)
+        place = inverse(tree.zero[body.parent]) @ body.zero
+        nodes[body.name] = _body(nodes[body.parent], tree, body, place)
     equalities = ElementTree.SubElement(root, "equality")
     for closure in tree.closures:
         tie = _ties(tree, closure)
@@ -115,8 +115,8 @@ def _ties(tree: Multibody, closure: Closure) -> Ties:
     if closure.points is None:
         raise NotImplementedError(f"{closure.name}: MuJoCo's closures are at points")
     (a, b), s = closure.points, tree.scale
-    zero = {BASE: np.eye(4)} | {body.name: body.zero for body in tree.bodies}
-    turn = zero[closure.bodies[0]][:3, :3].T @ zero[closure.bodies[1]][:3, :3]
+    first, second = (tree.zero[body][:3, :3] for body in closure.bodies)
+    turn = first.T @ second
 
     def along(mine: Array, other: Array) -> tuple[Array, Array]:
         """Points on an axis, `other` up to its sign, which is as at zero."""
@@ -250,9 +250,8 @@ class Model:
         """All links where and as they move at the start."""
         model, data = self.model, self.data
         placements = start.placements | {BASE: np.eye(4)}
-        zeros = {BASE: np.eye(4)} | {body.name: body.zero for body in self.tree.bodies}
         for body in self.tree.bodies:
-            zero = inverse(zeros[body.parent]) @ body.zero
+            zero = inverse(self.tree.zero[body.parent]) @ body.zero
             now = inverse(placements[body.parent]) @ placements[body.name]
             values: list[Any] = list(joint_values(body, zero, now))
             if body.name == PLATFORM:

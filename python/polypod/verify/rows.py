@@ -53,8 +53,7 @@ Row = Slide | Square
 
 def rows_of(tree: Multibody) -> tuple[Row, ...]:
     """All scalar constraints, of the joints first, then of the closures; redundant ones too."""
-    zero = {BASE: np.eye(4)} | {body.name: body.zero for body in tree.bodies}
-    joints = [row for body in tree.bodies for row in _joint_rows(body, zero[body.parent])]
+    joints = [row for body in tree.bodies for row in _joint_rows(body, tree.zero[body.parent])]
     return (*joints, *(row for closure in tree.closures for row in _closure_rows(closure)))
 
 

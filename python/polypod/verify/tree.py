@@ -105,6 +105,11 @@ class Multibody:
     geometry: Mapping[str, Any]
     """The mechanism file's numbers in SI, as `Mechanism.geometry`."""
 
+    @property
+    def zero(self) -> Placements:
+        """Frame (4, 4) of the base and of each body in base axes where all joints are at zero."""
+        return {BASE: np.eye(4)} | {body.name: body.zero for body in self.bodies}
+
     def start(self, pose: Array) -> Placements:
         """Frame (4, 4) of each body in base axes with the platform at `pose` (4, 4), from points and axes.
 
