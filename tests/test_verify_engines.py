@@ -184,6 +184,16 @@ def test_of_any_size(size, engine):
     assert found.agrees, (found.comparisons[0].without_answer, exceeding(found))
 
 
+@pytest.mark.parametrize("engine", ENGINES)
+def test_at_rest_without_gravity(engine):
+    """The load alone tells what is small."""
+    tables = cases.case("stewart-gough").mech.to_dict()
+    tables["dynamics"] = {"gravity": [0.0, 0.0, 0.0]}
+    tables["units"]["acceleration"] = "m/s^2"
+    mech, rest = pp.Mechanism.from_dict(tables), np.zeros((1, 6))
+    assert verify_states(mech, mech.home[None], rest, rest, engines=[engine]).agrees
+
+
 def test_a_system_that_exudyn_finds_singular_has_no_answer(monkeypatch, capfd):
     """It goes on with accelerations of zero and a warning."""
     case = cases.case("6-sps")

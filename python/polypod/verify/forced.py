@@ -80,6 +80,19 @@ def inertial(tree: Multibody, body: Body) -> tuple[float, Array]:
     return share * body.mass, share * body.inertia
 
 
+def pull(tree: Multibody, wrench: Array) -> Array:
+    """(...,): gravity or, where there is none, what a load (..., 6) would give the platform alone, m/s^2.
+
+    What accelerations under forces are measured by where there is no motion.
+    """
+    gravity = float(np.linalg.norm(tree.geometry["gravity"]))
+    if gravity > 0.0:
+        return np.full(wrench.shape[:-1], gravity)
+    mass = next(body.mass for body in tree.bodies if body.name == PLATFORM)
+    force, torque = (np.linalg.norm(wrench[..., part], axis=-1) for part in (slice(0, 3), slice(3, 6)))
+    return np.asarray((force + torque / tree.scale) / mass)
+
+
 def light(tree: Multibody) -> tuple[float, Array]:
     """Mass and inertia (3, 3) of a link without mass."""
     mass = LIGHT * next(body.mass for body in tree.bodies if body.name == PLATFORM)

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from polypod.status import Status
-from polypod.verify.forced import Forced, inertial, light
+from polypod.verify.forced import Forced, inertial, light, pull
 from polypod.verify.placement import BASE, PLATFORM, cross, inverse, turn_about
 from polypod.verify.rows import Start
 from polypod.verify.tree import POINT, Body, Closure, Freedom, Multibody, joint_values
@@ -36,9 +36,9 @@ of the model: a light link that carries heavy ones hardly holds them. In passes 
 platform's."""
 CONVERGED = 1e-12
 """Largest change of an acceleration from one pass to the next, as a part of the greatest of all links or of
-gravity; angular ones times the characteristic length."""
+what `pull` says; angular ones times the characteristic length."""
 PASSES = 50
-"""At most; most states take five."""
+"""At most; states away from singular ones take three to five."""
 STEP = 1e-4
 """s."""
 
@@ -222,9 +222,9 @@ class Model:
         for leg, force in zip(self.tree.legs, forces, strict=True):
             data.qfrc_applied[self._joint(leg.piston, 0).dofadr[0]] = force / self.unit
         damping = np.repeat([geometry["linear_damping"], geometry["angular_damping"]], 3)
-        pull = (wrench - damping * twist) / (geometry["efficiency"] * self.unit)
+        push = (wrench - damping * twist) / (geometry["efficiency"] * self.unit)
         point = start.placements[PLATFORM][:3, 3]
-        mujoco.mj_applyFT(model, data, pull[:3], pull[3:], point, self._bodies[PLATFORM], data.qfrc_applied)
+        mujoco.mj_applyFT(model, data, push[:3], push[3:], point, self._bodies[PLATFORM], data.qfrc_applied)
         while True:
             mujoco.mj_forward(model, data)
             yield self._accelerations(point)
@@ -306,7 +306,7 @@ class Twin(Forced):
     def accelerations(self, start: Start, twist: Array, wrench: Array, forces: Array) -> Array | Status:
         """`Forced.accelerations`; NOT_CONVERGED where `PASSES` passes are not enough."""
         state = (start, twist, wrench, forces)
-        moved = self._converged(self.hard.passes(*state))
+        moved = self._converged(self.hard.passes(*state), float(pull(self.tree, wrench)))
         if moved is None:
             return Status.NOT_CONVERGED
         platform = self.numbers[PLATFORM]
@@ -317,12 +317,11 @@ class Twin(Forced):
             self.gaps[name] = max(self.gaps.get(name, 0.0), off / size if size > 0.0 else 0.0)
         return moved
 
-    def _converged(self, passes: Iterable[Array]) -> Array | None:
-        """The accelerations that a pass no longer changes."""
+    def _converged(self, passes: Iterable[Array], least: float) -> Array | None:
+        """The accelerations that a pass no longer changes, measured by the greatest or `least` size."""
         arcs = np.repeat([1.0, self.tree.scale], 3)
-        gravity = float(np.linalg.norm(self.tree.geometry["gravity"]))
         for before, after in pairwise(islice(passes, PASSES)):
             change, size = (float(np.max(np.abs(a * arcs))) for a in (after - before, after))
-            if change <= CONVERGED * max(size, gravity):
+            if change <= CONVERGED * max(size, least):
                 return after
         return None

@@ -16,6 +16,7 @@ from polypod.mechanism import Mechanism
 from polypod.motion import Motion
 from polypod.solution import states_along
 from polypod.status import Status
+from polypod.verify.forced import pull
 from polypod.verify.tree import Multibody, describe
 
 Array = NDArray[np.float64]
@@ -72,7 +73,8 @@ QUANTITIES: dict[str, tuple[str, str, str]] = {
 RELATIVE_TO = (
     "the greatest value of the quantity among all parts at the same state, or where that is greater to the "
     "platform's own motion there; constraint forces and torques also to the greatest active force, "
-    "accelerations under given forces also to gravity"
+    "accelerations under given forces also to gravity, or where there is none to the load over the "
+    "platform's mass"
 )
 
 
@@ -446,7 +448,7 @@ def _compare(
     rows: tuple[Row, ...] = ()
     if both:
         values = {q: np.array([found[q] for found in theirs]) for q in mine if q in theirs[0]}
-        weight = float(np.linalg.norm(tree.geometry["gravity"])) if driven else 0.0
+        weight = pull(tree, loads[chosen]) if driven else np.zeros(len(both))
         scales = _scales(mech, states, mine["forces"][chosen], weight, chosen)
         limit = ENGINES[name].approximate
         # Counts are exact in any engine.
@@ -489,7 +491,7 @@ def _finite(value: float) -> float | None:
 
 
 def _scales(
-    mech: Mechanism, states: States, forces: Array, weight: float, chosen: NDArray[np.int64]
+    mech: Mechanism, states: States, forces: Array, weight: Array, chosen: NDArray[np.int64]
 ) -> dict[str, Array]:
     """(N,): what each kind of quantity is at least compared with, so that rounding of zero is no error."""
     size = mech.characteristic_length
