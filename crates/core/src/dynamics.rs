@@ -5,7 +5,7 @@ use crate::jacobian::{Matrix6, scaled_jacobian};
 use crate::leg;
 use crate::linear::solve;
 use crate::mechanism::{Body, Leg, Mechanism, Rod};
-use crate::real::Real;
+use crate::real::{Constant, Real};
 use crate::spatial::{Acceleration, Mat3, Motion, Pose, Twist, Vec3, Wrench};
 use crate::spec::Axes;
 
@@ -35,7 +35,7 @@ pub(crate) fn inertial_torque<T: Real>(body: &Body, axes: Mat3<T>, omega: Vec3<T
 
 /// The platform's own term of [Eq. 42]: weight, inertia and damping, as a wrench at o.
 #[inline(always)]
-pub fn platform_wrench<T: Real>(mech: &Mechanism, platform: &Motion<T>) -> Wrench<T> {
+pub fn platform_wrench<T: Real>(mech: &Mechanism<impl Constant<T>>, platform: &Motion<T>) -> Wrench<T> {
     let Motion { pose, twist, acceleration } = platform;
     let body = &mech.platform;
     let center = pose.rotation * Vec3::lift(body.center);
@@ -47,13 +47,18 @@ pub fn platform_wrench<T: Real>(mech: &Mechanism, platform: &Motion<T>) -> Wrenc
 
 /// The platform's damping, a part of [Eq. 42]: `f_d = -μ v, t_d = -μ ω`.
 #[inline(always)]
-pub fn damping_wrench<T: Real>(mech: &Mechanism, twist: &Twist<T>) -> Wrench<T> {
+pub fn damping_wrench<T: Real>(mech: &Mechanism<impl Constant<T>>, twist: &Twist<T>) -> Wrench<T> {
     Wrench::new(-(twist.v * T::lit(mech.linear_damping)), -(twist.omega * T::lit(mech.angular_damping)))
 }
 
 /// Cylinder, piston and the rods that the leg leads, carried to the platform \[T14\].
 #[inline(always)]
-fn leg_wrench<T: Real>(mech: &Mechanism, index: usize, leg: &Leg, platform: &Motion<T>) -> Wrench<T> {
+fn leg_wrench<T: Real>(
+    mech: &Mechanism<impl Constant<T>>,
+    index: usize,
+    leg: &Leg<impl Constant<T>>,
+    platform: &Motion<T>,
+) -> Wrench<T> {
     let gravity = Vec3::lift(mech.gravity);
     let state = leg::state(leg, platform);
     let (f, turn) = (&state.frame, &state.turn);
@@ -75,13 +80,21 @@ fn leg_wrench<T: Real>(mech: &Mechanism, index: usize, leg: &Leg, platform: &Mot
 
 /// Torque of the rod's weight and inertia about its line [Eq. 36, 42].
 #[inline(always)]
-fn rod_torque<T: Real>(mech: &Mechanism, rod: &Rod, leader: &leg::State<T>) -> T {
+fn rod_torque<T: Real>(
+    mech: &Mechanism<impl Constant<T>>,
+    rod: &Rod<impl Constant<T>>,
+    leader: &leg::State<T>,
+) -> T {
     Vec3::lift(rod.axis).dot(rod_wrench(mech, rod, leader).torque)
 }
 
 /// The rod's weight and inertia as a wrench at its point, from its turn and its axes (L, n, L×n) [Eq. 36, 42].
 #[inline(always)]
-pub(crate) fn rod_wrench<T: Real>(mech: &Mechanism, rod: &Rod, leader: &leg::State<T>) -> Wrench<T> {
+pub(crate) fn rod_wrench<T: Real>(
+    mech: &Mechanism<impl Constant<T>>,
+    rod: &Rod<impl Constant<T>>,
+    leader: &leg::State<T>,
+) -> Wrench<T> {
     let (axis, n) = (Vec3::lift(rod.axis), leader.frame.n());
     let turn = leg::rod_turn(axis, leader);
     let (omega, eps) = (axis * turn.rate, axis * turn.acceleration);
@@ -95,7 +108,11 @@ pub(crate) fn rod_wrench<T: Real>(mech: &Mechanism, rod: &Rod, leader: &leg::Sta
 /// All that the actuators and constraints must balance, as a wrench at o: the braces of [Eq. 43]. The paper's
 /// efficiency η divides the platform's term alone.
 #[inline(always)]
-pub fn resultant<T: Real>(mech: &Mechanism, platform: &Motion<T>, load: Wrench<T>) -> Wrench<T> {
+pub fn resultant<T: Real>(
+    mech: &Mechanism<impl Constant<T>>,
+    platform: &Motion<T>,
+    load: Wrench<T>,
+) -> Wrench<T> {
     let own = load + platform_wrench(mech, platform);
     let mut sum = own * T::lit(1.0 / mech.efficiency);
     for (i, leg) in mech.legs.iter().enumerate() {
@@ -108,7 +125,7 @@ pub fn resultant<T: Real>(mech: &Mechanism, platform: &Motion<T>, load: Wrench<T
 /// `F_r = -J⁻ᵀ {...}` [Eq. 43], with the pivot ratio of J.
 #[inline(always)]
 pub fn inverse_dynamics<T: Real>(
-    mech: &Mechanism,
+    mech: &Mechanism<impl Constant<T>>,
     platform: &Motion<T>,
     load: Wrench<T>,
 ) -> ([T; 6], T::Value) {
@@ -117,7 +134,11 @@ pub fn inverse_dynamics<T: Real>(
 
 /// Active forces and multipliers that balance a wrench on the platform at o, with the pivot ratio of J \[T15\].
 #[inline(always)]
-pub fn balancing<T: Real>(mech: &Mechanism, pose: &Pose<T>, w: Wrench<T>) -> ([T; 6], T::Value) {
+pub fn balancing<T: Real>(
+    mech: &Mechanism<impl Constant<T>>,
+    pose: &Pose<T>,
+    w: Wrench<T>,
+) -> ([T; 6], T::Value) {
     let scaled = Wrench::new(w.force, w.torque * T::lit(1.0 / mech.characteristic_length));
     let solved = solve(transposed(&scaled_jacobian(mech, pose)), scaled.array().map(|x| -x));
     (solved.x, solved.pivots)
@@ -131,7 +152,7 @@ fn transposed<T: Real>(m: &Matrix6<T>) -> Matrix6<T> {
 /// Kinetic and potential energy of all links \[T17\]. Velocities only: with duals along the motion it
 /// gives the power of inertia and weight without the way that [`inverse_dynamics`] takes.
 #[inline(always)]
-pub fn energy<T: Real>(mech: &Mechanism, pose: &Pose<T>, twist: &Twist<T>) -> (T, T) {
+pub fn energy<T: Real>(mech: &Mechanism<impl Constant<T>>, pose: &Pose<T>, twist: &Twist<T>) -> (T, T) {
     let gravity = Vec3::lift(mech.gravity);
     let platform = Motion { pose: *pose, twist: *twist, acceleration: Acceleration::zero() };
     let link = |body: &Body, axes: Mat3<T>, omega: Vec3<T>, velocity: Vec3<T>, place: Vec3<T>| {
@@ -177,10 +198,10 @@ pub struct Coupled<T> {
 /// paper has c_3 = -c_1.
 #[inline(always)]
 pub fn coupled_forces<T: Real>(
-    mech: &Mechanism,
+    mech: &Mechanism<impl Constant<T>>,
     pair: [usize; 2],
-    axis: Vec3<f64>,
-    platform_axis: Vec3<f64>,
+    axis: Vec3<impl Constant<T>>,
+    platform_axis: Vec3<impl Constant<T>>,
     pose: &Pose<T>,
     f_c: T,
     as_printed: bool,
