@@ -59,23 +59,43 @@ fn leg_wrench<T: Real>(
     leg: &Leg<impl Constant<T>>,
     platform: &Motion<T>,
 ) -> Wrench<T> {
-    let gravity = Vec3::lift(mech.gravity);
     let state = leg::state(leg, platform);
+    let mut wrench = links_wrench(mech, leg, &state);
+    for rod in mech.rods.iter().filter(|rod| rod.leader == index) {
+        wrench = wrench + carried_rod(mech, rod, &state);
+    }
+    wrench
+}
+
+/// Cylinder and piston, carried to the platform.
+#[inline(always)]
+pub(crate) fn links_wrench<T: Real>(
+    mech: &Mechanism<impl Constant<T>>,
+    leg: &Leg<impl Constant<T>>,
+    state: &leg::State<T>,
+) -> Wrench<T> {
+    let gravity = Vec3::lift(mech.gravity);
     let (f, turn) = (&state.frame, &state.turn);
-    let (piston, cylinder) = (leg::piston(leg, &state), leg::cylinder(leg, &state));
+    let (piston, cylinder) = (leg::piston(leg, state), leg::cylinder(leg, state));
     let force = inertial_force(&leg.piston, gravity, piston.acceleration);
     let torque = piston.offset.cross(force)
         + cylinder.offset.cross(inertial_force(&leg.cylinder, gravity, cylinder.acceleration))
         + inertial_torque(&leg.piston, f.axes, turn.omega, turn.eps)
         + inertial_torque(&leg.cylinder, f.axes, turn.omega, turn.eps);
-    let mut wrench = leg::carry(leg, &state, force, torque);
-    for rod in mech.rods.iter().filter(|rod| rod.leader == index) {
-        let about = rod_torque(mech, rod, &state);
-        // The rod's power is its torque about L times ω_L = n·δ'/|L×δ|, with δ' = (v_b - ℓ'δ)/ℓ and n square to δ.
-        let p = &state.position;
-        wrench = wrench + Wrench::at(p.e, f.n() * (about / (f.sine * p.length)));
-    }
-    wrench
+    leg::carry(leg, state, force, torque)
+}
+
+/// A rod, carried to the platform by the leg that leads it.
+#[inline(always)]
+pub(crate) fn carried_rod<T: Real>(
+    mech: &Mechanism<impl Constant<T>>,
+    rod: &Rod<impl Constant<T>>,
+    leader: &leg::State<T>,
+) -> Wrench<T> {
+    let about = rod_torque(mech, rod, leader);
+    // The rod's power is its torque about L times ω_L = n·δ'/|L×δ|, with δ' = (v_b - ℓ'δ)/ℓ and n square to δ.
+    let (p, f) = (&leader.position, &leader.frame);
+    Wrench::at(p.e, f.n() * (about / (f.sine * p.length)))
 }
 
 /// Torque of the rod's weight and inertia about its line [Eq. 36, 42].
@@ -105,6 +125,16 @@ pub(crate) fn rod_wrench<T: Real>(
     Wrench::new(force, center.cross(force) + inertial_torque(&rod.body, axes, omega, eps))
 }
 
+/// The platform's own term and the load, divided by the paper's efficiency η [Eq. 43].
+#[inline(always)]
+pub(crate) fn own_wrench<T: Real>(
+    mech: &Mechanism<impl Constant<T>>,
+    platform: &Motion<T>,
+    load: Wrench<T>,
+) -> Wrench<T> {
+    (load + platform_wrench(mech, platform)) * T::lit(1.0 / mech.efficiency)
+}
+
 /// All that the actuators and constraints must balance, as a wrench at o: the braces of [Eq. 43]. The paper's
 /// efficiency η divides the platform's term alone.
 #[inline(always)]
@@ -113,8 +143,7 @@ pub fn resultant<T: Real>(
     platform: &Motion<T>,
     load: Wrench<T>,
 ) -> Wrench<T> {
-    let own = load + platform_wrench(mech, platform);
-    let mut sum = own * T::lit(1.0 / mech.efficiency);
+    let mut sum = own_wrench(mech, platform, load);
     for (i, leg) in mech.legs.iter().enumerate() {
         sum = sum + leg_wrench(mech, i, leg, platform);
     }
@@ -139,13 +168,23 @@ pub fn balancing<T: Real>(
     pose: &Pose<T>,
     w: Wrench<T>,
 ) -> ([T; 6], T::Value) {
+    balanced(mech, transposed(&scaled_jacobian(mech, pose)), w)
+}
+
+/// The same with the transposed scaled Jacobian at hand.
+#[inline(always)]
+pub(crate) fn balanced<T: Real>(
+    mech: &Mechanism<impl Constant<T>>,
+    columns: Matrix6<T>,
+    w: Wrench<T>,
+) -> ([T; 6], T::Value) {
     let scaled = Wrench::new(w.force, w.torque * T::lit(1.0 / mech.characteristic_length));
-    let solved = solve(transposed(&scaled_jacobian(mech, pose)), scaled.array().map(|x| -x));
+    let solved = solve(columns, scaled.array().map(|x| -x));
     (solved.x, solved.pivots)
 }
 
 #[inline(always)]
-fn transposed<T: Real>(m: &Matrix6<T>) -> Matrix6<T> {
+pub(crate) fn transposed<T: Real>(m: &Matrix6<T>) -> Matrix6<T> {
     std::array::from_fn(|i| std::array::from_fn(|j| m[j][i]))
 }
 
