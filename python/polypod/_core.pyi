@@ -18,6 +18,7 @@ __all__ = [
     "__version__",
     "base_parameters",
     "fit_poses",
+    "geometry_parameters",
     "inertial_parameters",
     "inverse_dynamics_derivatives",
     "regressor",
@@ -145,6 +146,7 @@ def regressor(
     wrenches: _Array | None,
     platform_axes: bool,
 ) -> _Table: ...
+def geometry_parameters(mech: Mechanism) -> list[str]: ...
 def inertial_parameters(mech: Mechanism) -> tuple[list[str], list[str], _Array]: ...
 def base_parameters(mech: Mechanism) -> tuple[list[int], _Array, _Array] | None: ...
 

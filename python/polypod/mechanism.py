@@ -962,7 +962,8 @@ class Mechanism:
         """Exact derivatives of the active forces and multipliers of `inverse_dynamics` [T56, T57].
 
         By pose, twist and acceleration; by coordinates, their rates and second rates; by mass, mass centre
-        and inertia of every link. Of dual numbers: no differences are taken.
+        and inertia of every link; by points and axes of joints and rods, lengths too. Of dual numbers: no
+        differences are taken.
 
         Args:
             pose: (..., 4, 4).
@@ -991,7 +992,9 @@ class Mechanism:
         args = (*args, set, named)
         names, table = _core.inverse_dynamics_derivatives(self._core, *args)
         _, bodies, _ = _core.inertial_parameters(self._core)
-        return InverseDynamicsDerivatives(tuple(names), tuple(bodies), **_shaped(table, shape))
+        geometry = _core.geometry_parameters(self._core)
+        arrays = _shaped(table, shape)
+        return InverseDynamicsDerivatives(tuple(names), tuple(bodies), tuple(geometry), **arrays)
 
     def regressor(
         self,

@@ -8,7 +8,7 @@ use crate::constraint;
 use crate::linear::{Solved, solve};
 use crate::mechanism::{Constraint, ConstraintKind, MAX_CONSTRAINTS, Mechanism};
 use crate::mobility::count;
-use crate::real::{Dual, Jet, Real, Trig};
+use crate::real::{Constant, Dual, Jet, Real, Scalar, Trig};
 use crate::spatial::{Acceleration, Mat3, Motion, Pose, Twist, Vec3};
 use crate::status::Status;
 
@@ -19,23 +19,23 @@ pub type Values<T> = [T; MAX_COORDINATES];
 
 /// Frames of a mechanism whose one independent constraint is of kind A: X along L, x along l.
 #[derive(Clone, Copy, Debug)]
-pub struct Plane {
+pub struct Plane<S = f64> {
     /// Base axes of the angles, columns; the first is L.
-    base: Mat3<f64>,
+    base: Mat3<S>,
     /// Platform axes of the angles, columns; the first is l.
-    platform: Mat3<f64>,
+    platform: Mat3<S>,
     /// A point of the line L, base axes: the middle of the base joints that share the constraint.
-    base_point: Vec3<f64>,
+    base_point: Vec3<S>,
     /// The middle of their platform joints, platform axes; it stays in the plane of L and l.
-    platform_point: Vec3<f64>,
+    platform_point: Vec3<S>,
 }
 
 #[derive(Clone, Copy, Debug)]
-pub enum Set {
+pub enum Set<S = f64> {
     /// (x, y, z, α, β), γ from [Eq. 5] by its branch.
-    Paper(Plane),
+    Paper(Plane<S>),
     /// (α, p, h, β, γ): no dependent coordinate, no fold \[T20\].
-    Natural(Plane),
+    Natural(Plane<S>),
     /// Tip position and tool axis direction, the turn about the tool from the constraint \[T21\].
     Tool,
     /// x, y, z and the angles of Rx(rx) Ry(ry) Rz(rz) \[T22\].
@@ -56,7 +56,7 @@ const SOLVED: f64 = 1e-12;
 
 const NEWTON_STEPS: usize = 50;
 
-impl Set {
+impl<S: Scalar> Set<S> {
     #[must_use]
     pub fn name(&self) -> &'static str {
         match self {
@@ -78,37 +78,23 @@ impl Set {
         }
     }
 
-    /// The sets that a mechanism has.
+    /// The set of the same name for the mechanism while it varies.
     #[must_use]
-    pub fn of(mech: &Mechanism) -> Vec<Set> {
-        let mut sets = Vec::new();
-        if let Some(plane) = Plane::of(mech) {
-            if plane.lever().0.abs() > 1e-9 * mech.characteristic_length {
-                sets.push(Set::Paper(plane));
-            }
-            sets.push(Set::Natural(plane));
-        }
-        if mech.dof() >= 5 {
-            sets.push(Set::Tool);
-        }
-        sets.push(Set::Pose);
-        sets
-    }
-
-    /// Which numbers must be given: for each a `true`; none for the set [`Set::Pose`], where any will do.
-    #[must_use]
-    pub fn given(&self, mech: &Mechanism) -> Option<Vec<bool>> {
-        match self {
-            Set::Paper(_) => Some(vec![true, true, true, true, true, false]),
-            Set::Natural(_) => Some(vec![true; 5]),
-            Set::Tool => Some((0..7).map(|i| i < 6 || mech.dof() == 6).collect()),
-            Set::Pose => None,
-        }
+    pub fn varied<V: Scalar>(&self, mech: &Mechanism<V>) -> Option<Set<V>> {
+        Some(match self {
+            Set::Paper(_) => Set::Paper(Plane::varied(mech)?),
+            Set::Natural(_) => Set::Natural(Plane::varied(mech)?),
+            Set::Tool => Set::Tool,
+            Set::Pose => Set::Pose,
+        })
     }
 
     /// The map from the numbers to the pose.
     #[inline(always)]
-    pub fn pose<T: Trig>(&self, mech: &Mechanism, q: &Values<T>) -> Pose<T> {
+    pub fn pose<T: Trig>(&self, mech: &Mechanism<S>, q: &Values<T>) -> Pose<T>
+    where
+        S: Constant<T>,
+    {
         match self {
             Set::Paper(plane) => {
                 // [Eq. 2] R in the order XYX, o = (X_o, Y_o, Z_o)
@@ -138,6 +124,36 @@ impl Set {
                     * Mat3::rotation_z(q[5].sin_cos());
                 Pose { rotation: turn, o: Vec3::new(q[0], q[1], q[2]) }
             }
+        }
+    }
+}
+
+impl Set {
+    /// The sets that a mechanism has.
+    #[must_use]
+    pub fn of(mech: &Mechanism) -> Vec<Set> {
+        let mut sets = Vec::new();
+        if let Some(plane) = Plane::of(mech) {
+            if plane.lever().0.abs() > 1e-9 * mech.characteristic_length {
+                sets.push(Set::Paper(plane));
+            }
+            sets.push(Set::Natural(plane));
+        }
+        if mech.dof() >= 5 {
+            sets.push(Set::Tool);
+        }
+        sets.push(Set::Pose);
+        sets
+    }
+
+    /// Which numbers must be given: for each a `true`; none for the set [`Set::Pose`], where any will do.
+    #[must_use]
+    pub fn given(&self, mech: &Mechanism) -> Option<Vec<bool>> {
+        match self {
+            Set::Paper(_) => Some(vec![true, true, true, true, true, false]),
+            Set::Natural(_) => Some(vec![true; 5]),
+            Set::Tool => Some((0..7).map(|i| i < 6 || mech.dof() == 6).collect()),
+            Set::Pose => None,
         }
     }
 
@@ -183,10 +199,10 @@ impl Set {
     }
 }
 
-impl Plane {
+impl<S: Scalar> Plane<S> {
     /// The frames of a mechanism with one independent constraint, of kind A; none for others.
     #[must_use]
-    pub fn of(mech: &Mechanism) -> Option<Self> {
+    pub fn of(mech: &Mechanism<S>) -> Option<Self> {
         let [c] = mech.independent.as_slice() else {
             return None;
         };
@@ -194,7 +210,8 @@ impl Plane {
             return None;
         }
         // The legs whose A constraint is the same one: same axes, platform joints on one line along l.
-        let parallel = |a: Vec3<f64>, b: Vec3<f64>| a.cross(b).norm() <= 1e-9 * a.norm() * b.norm();
+        let size = |a: Vec3<S>| a.norm().value();
+        let parallel = |a: Vec3<S>, b: Vec3<S>| size(a.cross(b)) <= 1e-9 * size(a) * size(b);
         let sharing: Vec<_> = mech
             .constraints
             .iter()
@@ -208,8 +225,8 @@ impl Plane {
             })
             .collect();
         let share = 1.0 / count(sharing.len());
-        let mean = |point: fn(&Constraint) -> Vec3<f64>| {
-            sharing.iter().map(|d| point(d)).fold(Vec3::zero(), |sum, p| sum + p) * share
+        let mean = |point: fn(&Constraint<S>) -> Vec3<S>| {
+            sharing.iter().map(|d| point(d)).fold(Vec3::zero(), |sum, p| sum + p).scale(share)
         };
         Some(Plane {
             base: frame_along(c.base_axis),
@@ -219,15 +236,32 @@ impl Plane {
         })
     }
 
+    /// The frames while the joints that share the constraint vary one by one: the middles then stay on the lines of
+    /// the independent one \[T56\].
+    fn varied(mech: &Mechanism<S>) -> Option<Self> {
+        let (plane, c) = (Plane::of(mech)?, mech.independent.first()?);
+        let on = |line: Vec3<S>, from: Vec3<S>, point: Vec3<S>| from + line * line.dot(point - from);
+        Some(Plane {
+            base_point: on(c.base_axis, c.base_point, plane.base_point),
+            platform_point: on(c.platform_axis, c.platform_point, plane.platform_point),
+            ..plane
+        })
+    }
+
     /// [Eq. 2] `R = Rx(α) Ry(β) Rx(γ)` between the plane's axes of base and platform.
     #[inline(always)]
-    fn rotation<T: Trig>(&self, alpha: T, beta: T, gamma: T) -> Mat3<T> {
+    fn rotation<T: Trig>(&self, alpha: T, beta: T, gamma: T) -> Mat3<T>
+    where
+        S: Constant<T>,
+    {
         let xyx = Mat3::rotation_x(alpha.sin_cos())
             * Mat3::rotation_y(beta.sin_cos())
             * Mat3::rotation_x(gamma.sin_cos());
         Mat3::lift(self.base) * xyx * Mat3::lift(self.platform.transpose())
     }
+}
 
+impl Plane {
     /// The signed distance of the reference point from the line through o along l, and its angle about that line,
     /// within a quarter turn of y: for the paper (e sin θ_1, 0).
     fn lever(&self) -> (f64, f64) {
@@ -264,10 +298,10 @@ impl Plane {
 }
 
 /// Columns x along `axis`, z as near to the body's z as it can be, y to the right of both.
-fn frame_along(axis: Vec3<f64>) -> Mat3<f64> {
+fn frame_along<S: Scalar>(axis: Vec3<S>) -> Mat3<S> {
     let x = axis.unit();
-    let y = Vec3::Z.cross(x);
-    let y = if y.norm() > 1e-9 { y.unit() } else { Vec3::Y };
+    let y = Vec3::lift(Vec3::Z).cross(x);
+    let y = if y.norm().value() > 1e-9 { y.unit() } else { Vec3::lift(Vec3::Y) };
     Mat3::from_columns(x, y, x.cross(y))
 }
 
@@ -348,12 +382,15 @@ fn jets(x: Vec3<f64>, d: Vec3<f64>, dd: Vec3<f64>) -> Vec3<Jet<f64>> {
 /// constraints are kept: by one Newton step in duals, which is exact from a solution on \[T56\]. With the pivot ratio of
 /// what determines them.
 #[must_use]
-pub fn varied(
-    mech: &Mechanism,
-    set: &Set,
+pub fn varied<S>(
+    mech: &Mechanism<S>,
+    set: &Set<S>,
     q: &Values<Jet<Dual<f64>>>,
     given: &[bool],
-) -> (Motion<Dual<f64>>, f64) {
+) -> (Motion<Dual<f64>>, f64)
+where
+    S: Constant<Jet<Dual<f64>>> + Constant<Dual<Dual<f64>>>,
+{
     let mut q = *q;
     let dependent: Vec<usize> = (0..set.names().len()).filter(|&i| !given[i]).collect();
     let residual = constraint_parts(mech, &set.pose(mech, &q), |g| -g.x);
@@ -476,7 +513,15 @@ fn solve_dependent(
 
 /// Rates and second rates of the dependent coordinates at known values, from one matrix: `G_y y' = -ġ(y' = 0)`,
 /// `G_y y'' = -g̈(y'' = 0)` \[T23\]. They must be zero before. With the pivot ratio and the sign of det G_y.
-fn follow<T: Trig>(mech: &Mechanism, set: &Set, q: &mut Values<Jet<T>>, dependent: &[usize]) -> (f64, f64) {
+fn follow<T: Trig, S>(
+    mech: &Mechanism<S>,
+    set: &Set<S>,
+    q: &mut Values<Jet<T>>,
+    dependent: &[usize],
+) -> (f64, f64)
+where
+    S: Constant<Jet<T>> + Constant<Dual<T>>,
+{
     let matrix = gradient(mech, set, q, dependent);
     let rates = |q: &Values<Jet<T>>, part: fn(Jet<T>) -> T| -> Solved<T, System<T>> {
         solve(matrix, constraint_parts(mech, &set.pose(mech, q), part))
@@ -493,7 +538,11 @@ fn follow<T: Trig>(mech: &Mechanism, set: &Set, q: &mut Values<Jet<T>>, dependen
 }
 
 /// What `part` takes of the values of the independent constraints in pure numbers; zero beyond their number.
-fn constraint_parts<S: Real, T: Real>(mech: &Mechanism, pose: &Pose<S>, part: fn(S) -> T) -> System<T> {
+fn constraint_parts<N: Real, T: Real>(
+    mech: &Mechanism<impl Constant<N>>,
+    pose: &Pose<N>,
+    part: fn(N) -> T,
+) -> System<T> {
     std::array::from_fn(|k| {
         mech.independent.get(k).map_or_else(T::zero, |c| {
             part(constraint::value(c, pose)) / T::lit(constraint::unit(c, mech.characteristic_length))
@@ -529,9 +578,9 @@ fn reach(set: &Set, index: usize, scale: f64) -> f64 {
 }
 
 /// ∂g/∂y by duals, unused rows and columns those of the identity.
-fn gradient<T: Trig>(
-    mech: &Mechanism,
-    set: &Set,
+fn gradient<T: Trig, S: Constant<Dual<T>>>(
+    mech: &Mechanism<S>,
+    set: &Set<S>,
     q: &Values<Jet<T>>,
     dependent: &[usize],
 ) -> [System<T>; MAX_CONSTRAINTS] {

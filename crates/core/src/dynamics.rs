@@ -5,7 +5,7 @@ use crate::jacobian::{Matrix6, scaled_jacobian};
 use crate::leg;
 use crate::linear::solve;
 use crate::mechanism::{Body, Leg, Mechanism, Rod};
-use crate::real::Real;
+use crate::real::{Constant, Real};
 use crate::spatial::{Acceleration, Mat3, Motion, Pose, Twist, Vec3, Wrench};
 use crate::spec::Axes;
 
@@ -35,7 +35,7 @@ pub(crate) fn inertial_torque<T: Real>(body: &Body, axes: Mat3<T>, omega: Vec3<T
 
 /// The platform's own term of [Eq. 42]: weight, inertia and damping, as a wrench at o.
 #[inline(always)]
-pub fn platform_wrench<T: Real>(mech: &Mechanism, platform: &Motion<T>) -> Wrench<T> {
+pub fn platform_wrench<T: Real>(mech: &Mechanism<impl Constant<T>>, platform: &Motion<T>) -> Wrench<T> {
     let Motion { pose, twist, acceleration } = platform;
     let body = &mech.platform;
     let center = pose.rotation * Vec3::lift(body.center);
@@ -47,41 +47,74 @@ pub fn platform_wrench<T: Real>(mech: &Mechanism, platform: &Motion<T>) -> Wrenc
 
 /// The platform's damping, a part of [Eq. 42]: `f_d = -μ v, t_d = -μ ω`.
 #[inline(always)]
-pub fn damping_wrench<T: Real>(mech: &Mechanism, twist: &Twist<T>) -> Wrench<T> {
+pub fn damping_wrench<T: Real>(mech: &Mechanism<impl Constant<T>>, twist: &Twist<T>) -> Wrench<T> {
     Wrench::new(-(twist.v * T::lit(mech.linear_damping)), -(twist.omega * T::lit(mech.angular_damping)))
 }
 
 /// Cylinder, piston and the rods that the leg leads, carried to the platform \[T14\].
 #[inline(always)]
-fn leg_wrench<T: Real>(mech: &Mechanism, index: usize, leg: &Leg, platform: &Motion<T>) -> Wrench<T> {
-    let gravity = Vec3::lift(mech.gravity);
+fn leg_wrench<T: Real>(
+    mech: &Mechanism<impl Constant<T>>,
+    index: usize,
+    leg: &Leg<impl Constant<T>>,
+    platform: &Motion<T>,
+) -> Wrench<T> {
     let state = leg::state(leg, platform);
+    let mut wrench = links_wrench(mech, leg, &state);
+    for rod in mech.rods.iter().filter(|rod| rod.leader == index) {
+        wrench = wrench + carried_rod(mech, rod, &state);
+    }
+    wrench
+}
+
+/// Cylinder and piston, carried to the platform.
+#[inline(always)]
+pub(crate) fn links_wrench<T: Real>(
+    mech: &Mechanism<impl Constant<T>>,
+    leg: &Leg<impl Constant<T>>,
+    state: &leg::State<T>,
+) -> Wrench<T> {
+    let gravity = Vec3::lift(mech.gravity);
     let (f, turn) = (&state.frame, &state.turn);
-    let (piston, cylinder) = (leg::piston(leg, &state), leg::cylinder(leg, &state));
+    let (piston, cylinder) = (leg::piston(leg, state), leg::cylinder(leg, state));
     let force = inertial_force(&leg.piston, gravity, piston.acceleration);
     let torque = piston.offset.cross(force)
         + cylinder.offset.cross(inertial_force(&leg.cylinder, gravity, cylinder.acceleration))
         + inertial_torque(&leg.piston, f.axes, turn.omega, turn.eps)
         + inertial_torque(&leg.cylinder, f.axes, turn.omega, turn.eps);
-    let mut wrench = leg::carry(leg, &state, force, torque);
-    for rod in mech.rods.iter().filter(|rod| rod.leader == index) {
-        let about = rod_torque(mech, rod, &state);
-        // The rod's power is its torque about L times ω_L = n·δ'/|L×δ|, with δ' = (v_b - ℓ'δ)/ℓ and n square to δ.
-        let p = &state.position;
-        wrench = wrench + Wrench::at(p.e, f.n() * (about / (f.sine * p.length)));
-    }
-    wrench
+    leg::carry(leg, state, force, torque)
+}
+
+/// A rod, carried to the platform by the leg that leads it.
+#[inline(always)]
+pub(crate) fn carried_rod<T: Real>(
+    mech: &Mechanism<impl Constant<T>>,
+    rod: &Rod<impl Constant<T>>,
+    leader: &leg::State<T>,
+) -> Wrench<T> {
+    let about = rod_torque(mech, rod, leader);
+    // The rod's power is its torque about L times ω_L = n·δ'/|L×δ|, with δ' = (v_b - ℓ'δ)/ℓ and n square to δ.
+    let (p, f) = (&leader.position, &leader.frame);
+    Wrench::at(p.e, f.n() * (about / (f.sine * p.length)))
 }
 
 /// Torque of the rod's weight and inertia about its line [Eq. 36, 42].
 #[inline(always)]
-fn rod_torque<T: Real>(mech: &Mechanism, rod: &Rod, leader: &leg::State<T>) -> T {
+fn rod_torque<T: Real>(
+    mech: &Mechanism<impl Constant<T>>,
+    rod: &Rod<impl Constant<T>>,
+    leader: &leg::State<T>,
+) -> T {
     Vec3::lift(rod.axis).dot(rod_wrench(mech, rod, leader).torque)
 }
 
 /// The rod's weight and inertia as a wrench at its point, from its turn and its axes (L, n, L×n) [Eq. 36, 42].
 #[inline(always)]
-pub(crate) fn rod_wrench<T: Real>(mech: &Mechanism, rod: &Rod, leader: &leg::State<T>) -> Wrench<T> {
+pub(crate) fn rod_wrench<T: Real>(
+    mech: &Mechanism<impl Constant<T>>,
+    rod: &Rod<impl Constant<T>>,
+    leader: &leg::State<T>,
+) -> Wrench<T> {
     let (axis, n) = (Vec3::lift(rod.axis), leader.frame.n());
     let turn = leg::rod_turn(axis, leader);
     let (omega, eps) = (axis * turn.rate, axis * turn.acceleration);
@@ -92,12 +125,25 @@ pub(crate) fn rod_wrench<T: Real>(mech: &Mechanism, rod: &Rod, leader: &leg::Sta
     Wrench::new(force, center.cross(force) + inertial_torque(&rod.body, axes, omega, eps))
 }
 
+/// The platform's own term and the load, divided by the paper's efficiency η [Eq. 43].
+#[inline(always)]
+pub(crate) fn own_wrench<T: Real>(
+    mech: &Mechanism<impl Constant<T>>,
+    platform: &Motion<T>,
+    load: Wrench<T>,
+) -> Wrench<T> {
+    (load + platform_wrench(mech, platform)) * T::lit(1.0 / mech.efficiency)
+}
+
 /// All that the actuators and constraints must balance, as a wrench at o: the braces of [Eq. 43]. The paper's
 /// efficiency η divides the platform's term alone.
 #[inline(always)]
-pub fn resultant<T: Real>(mech: &Mechanism, platform: &Motion<T>, load: Wrench<T>) -> Wrench<T> {
-    let own = load + platform_wrench(mech, platform);
-    let mut sum = own * T::lit(1.0 / mech.efficiency);
+pub fn resultant<T: Real>(
+    mech: &Mechanism<impl Constant<T>>,
+    platform: &Motion<T>,
+    load: Wrench<T>,
+) -> Wrench<T> {
+    let mut sum = own_wrench(mech, platform, load);
     for (i, leg) in mech.legs.iter().enumerate() {
         sum = sum + leg_wrench(mech, i, leg, platform);
     }
@@ -108,7 +154,7 @@ pub fn resultant<T: Real>(mech: &Mechanism, platform: &Motion<T>, load: Wrench<T
 /// `F_r = -J⁻ᵀ {...}` [Eq. 43], with the pivot ratio of J.
 #[inline(always)]
 pub fn inverse_dynamics<T: Real>(
-    mech: &Mechanism,
+    mech: &Mechanism<impl Constant<T>>,
     platform: &Motion<T>,
     load: Wrench<T>,
 ) -> ([T; 6], T::Value) {
@@ -117,21 +163,35 @@ pub fn inverse_dynamics<T: Real>(
 
 /// Active forces and multipliers that balance a wrench on the platform at o, with the pivot ratio of J \[T15\].
 #[inline(always)]
-pub fn balancing<T: Real>(mech: &Mechanism, pose: &Pose<T>, w: Wrench<T>) -> ([T; 6], T::Value) {
+pub fn balancing<T: Real>(
+    mech: &Mechanism<impl Constant<T>>,
+    pose: &Pose<T>,
+    w: Wrench<T>,
+) -> ([T; 6], T::Value) {
+    balanced(mech, transposed(&scaled_jacobian(mech, pose)), w)
+}
+
+/// The same with the transposed scaled Jacobian at hand.
+#[inline(always)]
+pub(crate) fn balanced<T: Real>(
+    mech: &Mechanism<impl Constant<T>>,
+    columns: Matrix6<T>,
+    w: Wrench<T>,
+) -> ([T; 6], T::Value) {
     let scaled = Wrench::new(w.force, w.torque * T::lit(1.0 / mech.characteristic_length));
-    let solved = solve(transposed(&scaled_jacobian(mech, pose)), scaled.array().map(|x| -x));
+    let solved = solve(columns, scaled.array().map(|x| -x));
     (solved.x, solved.pivots)
 }
 
 #[inline(always)]
-fn transposed<T: Real>(m: &Matrix6<T>) -> Matrix6<T> {
+pub(crate) fn transposed<T: Real>(m: &Matrix6<T>) -> Matrix6<T> {
     std::array::from_fn(|i| std::array::from_fn(|j| m[j][i]))
 }
 
 /// Kinetic and potential energy of all links \[T17\]. Velocities only: with duals along the motion it
 /// gives the power of inertia and weight without the way that [`inverse_dynamics`] takes.
 #[inline(always)]
-pub fn energy<T: Real>(mech: &Mechanism, pose: &Pose<T>, twist: &Twist<T>) -> (T, T) {
+pub fn energy<T: Real>(mech: &Mechanism<impl Constant<T>>, pose: &Pose<T>, twist: &Twist<T>) -> (T, T) {
     let gravity = Vec3::lift(mech.gravity);
     let platform = Motion { pose: *pose, twist: *twist, acceleration: Acceleration::zero() };
     let link = |body: &Body, axes: Mat3<T>, omega: Vec3<T>, velocity: Vec3<T>, place: Vec3<T>| {
@@ -177,10 +237,10 @@ pub struct Coupled<T> {
 /// paper has c_3 = -c_1.
 #[inline(always)]
 pub fn coupled_forces<T: Real>(
-    mech: &Mechanism,
+    mech: &Mechanism<impl Constant<T>>,
     pair: [usize; 2],
-    axis: Vec3<f64>,
-    platform_axis: Vec3<f64>,
+    axis: Vec3<impl Constant<T>>,
+    platform_axis: Vec3<impl Constant<T>>,
     pose: &Pose<T>,
     f_c: T,
     as_printed: bool,

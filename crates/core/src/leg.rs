@@ -2,7 +2,7 @@
 
 use crate::mechanism::{Leg, Side, Turning};
 use crate::quadratic::{Hessian, add_centripetal, point_columns};
-use crate::real::{Ordered, Real};
+use crate::real::{Constant, Ordered, Real};
 use crate::spatial::{Mat3, Motion, Pose, Vec3, Wrench};
 
 /// Where the leg is, base axes \[T1\].
@@ -19,14 +19,14 @@ pub struct Position<T> {
 
 /// e from o to b and r from B to b.
 #[inline(always)]
-pub fn vectors<T: Real>(leg: &Leg, pose: &Pose<T>) -> (Vec3<T>, Vec3<T>) {
+pub fn vectors<T: Real>(leg: &Leg<impl Constant<T>>, pose: &Pose<T>) -> (Vec3<T>, Vec3<T>) {
     let e = pose.rotation.of(leg.platform.point);
     (e, pose.o + e - Vec3::lift(leg.base.point))
 }
 
 /// [Eq. 2, 3] \[T1\] `e = R m, b = o + e, r = b - B, δ = r/ℓ`.
 #[inline(always)]
-pub fn position<T: Real>(leg: &Leg, pose: &Pose<T>) -> Position<T> {
+pub fn position<T: Real>(leg: &Leg<impl Constant<T>>, pose: &Pose<T>) -> Position<T> {
     let (e, r) = vectors(leg, pose);
     let length = r.norm();
     Position { e, r, length, delta: r * (T::one() / length) }
@@ -84,7 +84,7 @@ pub fn end<T: Real>(p: &Position<T>, platform: &Motion<T>) -> End<T> {
 
 /// The unit axis behind a leg's frame in base axes, and whether it turns with the platform.
 #[inline(always)]
-fn turning_axis<T: Real>(turning: Turning, pose: &Pose<T>) -> (Vec3<T>, bool) {
+fn turning_axis<T: Real>(turning: Turning<impl Constant<T>>, pose: &Pose<T>) -> (Vec3<T>, bool) {
     match turning {
         Turning::Across(Side::Platform, u) | Turning::Along(Side::Platform, u) => {
             (pose.rotation * Vec3::lift(u), true)
@@ -117,7 +117,7 @@ impl<T: Real> Frame<T> {
 
 /// [T5] `n = (u×δ)/|u×δ|` for a U joint, `n = u` for R and F.
 #[inline(always)]
-pub fn frame<T: Real>(leg: &Leg, pose: &Pose<T>, p: &Position<T>) -> Frame<T> {
+pub fn frame<T: Real>(leg: &Leg<impl Constant<T>>, pose: &Pose<T>, p: &Position<T>) -> Frame<T> {
     let (u, _) = turning_axis(leg.turning, pose);
     let normal = match leg.turning {
         Turning::Across(..) => u.cross(p.delta),
@@ -151,7 +151,7 @@ pub struct Turn<T> {
 /// The leg's angular velocity and acceleration: with u = L [Eq. 22-28], with u = -e/|e| on the platform [Eq. 29-35].
 #[inline(always)]
 pub fn turn<T: Real>(
-    leg: &Leg,
+    leg: &Leg<impl Constant<T>>,
     platform: &Motion<T>,
     p: &Position<T>,
     end: &End<T>,
@@ -203,7 +203,7 @@ pub struct State<T> {
 }
 
 #[inline(always)]
-pub fn state<T: Real>(leg: &Leg, platform: &Motion<T>) -> State<T> {
+pub fn state<T: Real>(leg: &Leg<impl Constant<T>>, platform: &Motion<T>) -> State<T> {
     let position = position(leg, &platform.pose);
     let end = end(&position, platform);
     let frame = frame(leg, &platform.pose, &position);
@@ -213,7 +213,12 @@ pub fn state<T: Real>(leg: &Leg, platform: &Motion<T>) -> State<T> {
 
 /// Carries a force F at b and a torque M on the leg to the platform: `F·v_b + M·ω_leg` as a wrench at o \[T14\].
 #[inline(always)]
-pub fn carry<T: Real>(leg: &Leg, state: &State<T>, force: Vec3<T>, torque: Vec3<T>) -> Wrench<T> {
+pub fn carry<T: Real>(
+    leg: &Leg<impl Constant<T>>,
+    state: &State<T>,
+    force: Vec3<T>,
+    torque: Vec3<T>,
+) -> Wrench<T> {
     let State { position: p, frame: f, .. } = state;
     // M·ω_leg = (M×δ)·δ' + (M·δ) s, and s = N'·w is linear in δ' (through u×δ') and in ω_u (through u').
     let about = torque.dot(p.delta);
@@ -256,14 +261,14 @@ fn point_motion<T: Real>(
 
 /// The piston's mass centre, offset from b [Eq. 38, 39] \[T8\].
 #[inline(always)]
-pub fn piston<T: Real>(leg: &Leg, state: &State<T>) -> PointMotion<T> {
+pub fn piston<T: Real>(leg: &Leg<impl Constant<T>>, state: &State<T>) -> PointMotion<T> {
     let offset = state.frame.axes * Vec3::lift(leg.piston.center);
     point_motion(&state.turn, offset, state.end.v_b, state.end.a_b)
 }
 
 /// The cylinder's mass centre, offset from B [Eq. 38, 39] \[T8\].
 #[inline(always)]
-pub fn cylinder<T: Real>(leg: &Leg, state: &State<T>) -> PointMotion<T> {
+pub fn cylinder<T: Real>(leg: &Leg<impl Constant<T>>, state: &State<T>) -> PointMotion<T> {
     let offset = state.frame.axes * Vec3::lift(leg.cylinder.center);
     point_motion(&state.turn, offset, Vec3::zero(), Vec3::zero())
 }

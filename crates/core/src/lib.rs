@@ -17,6 +17,7 @@ pub mod dynamics;
 pub mod forward;
 pub mod forward_dynamics;
 pub mod forward_lanes;
+pub mod geometry;
 pub mod inertial;
 pub mod jacobian;
 pub mod joints;

@@ -106,6 +106,53 @@ pub trait Trig: Scalar {
     fn atan2(self, x: Self) -> Self;
 }
 
+/// A number of the mechanism, a constant to the kernels' number `T`: a double, or one that carries its derivative by a
+/// number of the geometry, for kernels whose numbers carry that as well \[T56\].
+pub trait Constant<T: Real>: Scalar {
+    fn lift(self) -> T;
+
+    /// `x` times the constant.
+    #[must_use]
+    #[inline(always)]
+    fn times(self, x: T) -> T {
+        x * self.lift()
+    }
+}
+
+impl<T: Real> Constant<T> for f64 {
+    #[inline(always)]
+    fn lift(self) -> T {
+        T::lit(self)
+    }
+    #[inline(always)]
+    fn times(self, x: T) -> T {
+        x.scale(self)
+    }
+}
+
+impl Constant<Self> for Dual<f64> {
+    #[inline(always)]
+    fn lift(self) -> Self {
+        self
+    }
+}
+
+/// The same in any direction that the outer number differentiates by.
+impl Constant<Dual<Self>> for Dual<f64> {
+    #[inline(always)]
+    fn lift(self) -> Dual<Self> {
+        Dual::new(self, Self::zero())
+    }
+}
+
+/// At rest along a motion.
+impl Constant<Jet<Self>> for Dual<f64> {
+    #[inline(always)]
+    fn lift(self) -> Jet<Self> {
+        Jet::new(self, Self::zero(), Self::zero())
+    }
+}
+
 impl Real for f64 {
     type Value = Self;
     #[inline(always)]

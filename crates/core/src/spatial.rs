@@ -7,7 +7,7 @@ use std::ops::{Add, Mul, Neg, Sub};
 
 use serde::{Deserialize, Serialize};
 
-use crate::real::{Dual, Real};
+use crate::real::{Constant, Dual, Real, Scalar, Trig};
 
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(from = "[T; 3]", into = "[T; 3]")]
@@ -44,8 +44,8 @@ impl<T: Real> Vec3<T> {
 
     /// A constant of the mechanism as a vector of the kernel's number.
     #[inline(always)]
-    pub fn lift(a: Vec3<f64>) -> Self {
-        Vec3::new(T::lit(a.x), T::lit(a.y), T::lit(a.z))
+    pub fn lift(a: Vec3<impl Constant<T>>) -> Self {
+        Vec3 { x: a.x.lift(), y: a.y.lift(), z: a.z.lift() }
     }
 
     #[inline(always)]
@@ -77,8 +77,8 @@ impl<T: Real> Vec3<T> {
     /// The vector times a constant.
     #[must_use]
     #[inline(always)]
-    pub fn scale(self, k: f64) -> Self {
-        Vec3::new(self.x.scale(k), self.y.scale(k), self.z.scale(k))
+    pub fn scale(self, k: impl Constant<T>) -> Self {
+        Vec3::new(k.times(self.x), k.times(self.y), k.times(self.z))
     }
 
     #[inline(always)]
@@ -102,11 +102,13 @@ impl Vec3<f64> {
     pub const X: Self = Vec3 { x: 1.0, y: 0.0, z: 0.0 };
     pub const Y: Self = Vec3 { x: 0.0, y: 1.0, z: 0.0 };
     pub const Z: Self = Vec3 { x: 0.0, y: 0.0, z: 1.0 };
+}
 
+impl<T: Scalar> Vec3<T> {
     /// A unit vector square to this one, on the side of the base axis that this one leans on least.
     #[must_use]
     pub fn perpendicular(self) -> Self {
-        let [x, y, z] = self.map(f64::abs).array();
+        let [x, y, z] = self.map(|c| c.value().abs()).array();
         let axis = if z <= x && z <= y {
             Vec3::Z
         } else if y <= x {
@@ -114,7 +116,7 @@ impl Vec3<f64> {
         } else {
             Vec3::X
         };
-        self.cross(axis).cross(self).unit()
+        self.cross(Vec3::lift(axis)).cross(self).unit()
     }
 }
 
@@ -176,7 +178,7 @@ impl<T: Real> Mat3<T> {
     }
 
     #[inline(always)]
-    pub fn lift(m: Mat3<f64>) -> Self {
+    pub fn lift(m: Mat3<impl Constant<T>>) -> Self {
         let [x, y, z] = m.0;
         Mat3([Vec3::lift(x), Vec3::lift(y), Vec3::lift(z)])
     }
@@ -234,7 +236,7 @@ impl<T: Real> Mat3<T> {
     /// `M a` for a constant vector.
     #[must_use]
     #[inline(always)]
-    pub fn of(self, a: Vec3<f64>) -> Vec3<T> {
+    pub fn of(self, a: Vec3<impl Constant<T>>) -> Vec3<T> {
         let [x, y, z] = self.0;
         x.scale(a.x) + y.scale(a.y) + z.scale(a.z)
     }
@@ -266,23 +268,25 @@ impl<T: Real> Mat3<T> {
     }
 }
 
-impl Mat3<f64> {
+impl<T: Trig> Mat3<T> {
     /// Rodrigues' formula for the turn by |w| about w.
     #[must_use]
-    pub fn from_rotation_vector(w: Vec3<f64>) -> Self {
+    pub fn from_rotation_vector(w: Vec3<T>) -> Self {
         let angle = w.norm();
-        if angle == 0.0 {
-            return Mat3::identity();
+        if angle.value() == 0.0 {
+            return Mat3(Mat3::identity().0.map(|e: Vec3<T>| e + w.cross(e)));
         }
-        let axis = w * (1.0 / angle);
+        let axis = w * (T::one() / angle);
         let (s, c) = angle.sin_cos();
         Mat3(
             Mat3::identity()
                 .0
-                .map(|e: Vec3<f64>| e * c + axis.cross(e) * s + axis * (axis.dot(e) * (1.0 - c))),
+                .map(|e: Vec3<T>| e * c + axis.cross(e) * s + axis * (axis.dot(e) * (T::one() - c))),
         )
     }
+}
 
+impl Mat3<f64> {
     /// The inverse of [`Mat3::from_rotation_vector`] for turns below a half turn.
     #[must_use]
     pub fn rotation_vector(self) -> Vec3<f64> {

@@ -555,6 +555,7 @@ fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_function(wrap_pyfunction!(derivatives::inverse_dynamics_derivatives, m)?)?;
     m.add_function(wrap_pyfunction!(derivatives::regressor, m)?)?;
     m.add_function(wrap_pyfunction!(derivatives::inertial_parameters, m)?)?;
+    m.add_function(wrap_pyfunction!(derivatives::geometry_parameters, m)?)?;
     m.add_function(wrap_pyfunction!(derivatives::base_parameters, m)?)?;
     m.add_function(wrap_pyfunction!(workspace::fit_poses, m)?)?;
     m.add_class::<simulation::PyChart>()?;

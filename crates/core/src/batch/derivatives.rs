@@ -2,9 +2,10 @@
 
 use super::checks::{check_finite, limit_status, outcome, then};
 use super::{FieldId, Loads, States, Table};
-use crate::coordinates::{MAX_COORDINATES, Set};
+use crate::coordinates::{self, MAX_COORDINATES, Set};
 use crate::derivatives::{self, Part};
 use crate::dynamics;
+use crate::geometry;
 use crate::inertial::{self, Regressor};
 use crate::mechanism::Mechanism;
 use crate::real::Dual;
@@ -15,7 +16,8 @@ use crate::status::Status;
 type Pair = [FieldId; 2];
 
 /// Derivatives of active forces and multipliers by pose, twist and acceleration, by the `given` coordinates of a set
-/// with their rates and second rates, and by the numbers of the bodies \[T56\] \[T57\].
+/// with their rates and second rates, by the numbers of the bodies and by those of the geometry, this for lengths too
+/// \[T56\] \[T57\].
 #[must_use]
 pub fn inverse_dynamics_derivatives(
     mech: &Mechanism,
@@ -29,6 +31,7 @@ pub fn inverse_dynamics_derivatives(
     let chosen = (0..set.names().len()).filter(|&k| given[k]).count();
     let (forces, multipliers) = (mech.legs.len(), mech.independent.len());
     let bodies = inertial::parameters(mech).len();
+    let geometry = geometry::parameters(mech);
     let (mut table, ids) = Table::new(
         states.len(),
         [
@@ -46,10 +49,16 @@ pub fn inverse_dynamics_derivatives(
             ("constraint_by_second_rates", vec![multipliers, chosen]),
             ("forces_by_bodies", vec![forces, bodies]),
             ("constraint_by_bodies", vec![multipliers, bodies]),
+            ("forces_by_geometry", vec![forces, geometry.len()]),
+            ("constraint_by_geometry", vec![multipliers, geometry.len()]),
+            ("lengths_by_geometry", vec![forces, geometry.len()]),
         ],
     );
     let pair = |k: usize| [ids[2 * k], ids[2 * k + 1]];
+    let lengths = ids[16];
     let mut regressor = Regressor::new(mech);
+    let varied = geometry.iter().map(|parameter| geometry::varied(mech, parameter));
+    let varied: Option<Vec<_>> = varied.map(|v| Some((set.varied(&v)?, v))).collect();
     for i in 0..states.len() {
         let (platform, status) = solvable(mech, states, loads, i);
         table.status[i] = status;
@@ -68,6 +77,19 @@ pub fn inverse_dynamics_derivatives(
             Some(parts) => {
                 for (k, columns) in parts.iter().enumerate() {
                     put(mech, &mut table, pair(3 + k), i, columns);
+                }
+            }
+        }
+        let q = coordinates::along(mech, set, &platform);
+        let by = |(set, v): &(_, _)| derivatives::by_geometry(v, &q, &load, set, &given);
+        match varied.as_ref().and_then(|all| all.iter().map(by).collect::<Option<Vec<_>>>()) {
+            None => table.status[i] = Status::Fold,
+            Some(columns) => {
+                let forces: Vec<_> = columns.iter().map(|c| c.forces).collect();
+                put(mech, &mut table, pair(7), i, &forces);
+                for leg in 0..mech.legs.len() {
+                    let row: Vec<f64> = columns.iter().map(|c| c.lengths[leg]).collect();
+                    table.set(lengths, i, leg, &row);
                 }
             }
         }
