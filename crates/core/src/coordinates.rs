@@ -393,6 +393,9 @@ where
 {
     let mut q = *q;
     let dependent: Vec<usize> = (0..set.names().len()).filter(|&i| !given[i]).collect();
+    if dependent.is_empty() {
+        return (motion(&set.pose(mech, &q)), 1.0);
+    }
     let residual = constraint_parts(mech, &set.pose(mech, &q), |g| -g.x);
     let step = solve(gradient(mech, set, &q, &dependent), residual).x;
     for (&i, s) in dependent.iter().zip(step) {
