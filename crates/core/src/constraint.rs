@@ -193,14 +193,17 @@ pub fn hessian<T: Real>(constraint: &Constraint<impl Constant<T>>, pose: &Pose<T
             // g̈ = [l''×r + 2 l'×v_b + l×a_b]·L with l' = ω × l
             add_centripetal(&mut h, e, base.cross(platform));
             add_centripetal(&mut h, platform, r.cross(base));
-            add_mixed(&mut h, e, |w| base.cross(w.cross(platform)));
+            let [x, y, z] = Mat3::identity().0;
+            let [x, y, z] = [x.cross(platform), y.cross(platform), z.cross(platform)];
+            add_mixed(&mut h, e, [base.cross(x), base.cross(y), base.cross(z)]);
         }
         ConstraintKind::B => add_centripetal(&mut h, e, base),
         ConstraintKind::C => {
             // g̈ = a_b·a_P + 2 v_b·a_P' + r·a_P''
             add_centripetal(&mut h, e, platform);
             add_centripetal(&mut h, platform, r);
-            add_mixed(&mut h, e, |w| w.cross(platform));
+            let [x, y, z] = Mat3::identity().0;
+            add_mixed(&mut h, e, [x.cross(platform), y.cross(platform), z.cross(platform)]);
         }
         ConstraintKind::D => add_centripetal(&mut h, platform, base),
         ConstraintKind::E => {
@@ -212,8 +215,9 @@ pub fn hessian<T: Real>(constraint: &Constraint<impl Constant<T>>, pose: &Pose<T
             let (at_first, at_second) = (point_columns(v.e1), point_columns(e));
             for i in 0..6 {
                 for j in 0..6 {
-                    let q = |i: usize, j: usize| (turn * at_first[i]).cross(at_second[j]).dot(base);
-                    h[i][j] = h[i][j] + q(i, j) + q(j, i);
+                    let q = (turn * at_first[i]).cross(at_second[j]).dot(base);
+                    h[i][j] = h[i][j] + q;
+                    h[j][i] = h[j][i] + q;
                 }
             }
         }
@@ -236,12 +240,17 @@ pub fn length<S>(c: &Constraint<S>, scale: f64) -> f64 {
 /// Size of a row with its torque part divided by the length `scale`.
 #[must_use]
 pub fn row_size(row: &Wrench<f64>, scale: f64) -> f64 {
-    let torque = row.torque * (1.0 / scale);
-    (row.force.dot(row.force) + torque.dot(torque)).sqrt()
+    square(row, scale).sqrt()
+}
+
+/// The square of a row's size.
+#[inline(always)]
+pub(crate) fn square<T: Real>(row: &Wrench<T>, scale: f64) -> T {
+    row.force.dot(row.force) + row.torque.dot(row.torque).scale(1.0 / (scale * scale))
 }
 
 /// Rows smaller than this vanish: they give no direction and no distance.
-const VANISHING_ROW: f64 = 1e-6;
+pub(crate) const VANISHING_ROW: f64 = 1e-6;
 
 /// What a row is divided by to make it one of size one; a row that vanishes stays as small as it is.
 #[must_use]

@@ -363,19 +363,7 @@ fn motion<T: Trig>(pose: &Pose<Jet<T>>) -> Motion<T> {
 /// The numbers of the set with their rates along a motion: the inverse of [`state`].
 #[must_use]
 pub fn along(mech: &Mechanism, set: &Set, platform: &Motion<f64>) -> Values<Jet<f64>> {
-    let Motion { pose, twist, acceleration } = platform;
-    let second = acceleration.eps;
-    // [T2] with the columns of R for e: x' = ω × x, x'' = ε × x + ω × (ω × x)
-    let column = |x: Vec3<f64>| {
-        let x1 = twist.omega.cross(x);
-        jets(x, x1, second.cross(x) + twist.omega.cross(x1))
-    };
-    let o = jets(pose.o, twist.v, acceleration.a);
-    set.values(mech, &Pose { rotation: Mat3(pose.rotation.0.map(column)), o })
-}
-
-fn jets(x: Vec3<f64>, d: Vec3<f64>, dd: Vec3<f64>) -> Vec3<Jet<f64>> {
-    Vec3::new(Jet::new(x.x, d.x, dd.x), Jet::new(x.y, d.y, dd.y), Jet::new(x.z, d.z, dd.z))
+    set.values(mech, &platform.jets())
 }
 
 /// The motion with given coordinates that vary as duals; the others, whose values are known, follow so that the
@@ -420,7 +408,7 @@ fn tool_turn(mech: &Mechanism, q: &Values<Jet<f64>>) -> Status {
 }
 
 /// `½ Σ x_i × x_i'` over the columns of R is ω, `½ Σ x_i × x_i''` is ε \[T19\].
-fn half_cross<T: Trig>(r: &Mat3<Jet<T>>, part: fn(Jet<T>) -> T) -> Vec3<T> {
+fn half_cross<T: Real>(r: &Mat3<Jet<T>>, part: fn(Jet<T>) -> T) -> Vec3<T> {
     r.0.iter().map(|c| c.map(|j| j.x).cross(c.map(part))).fold(Vec3::zero(), |sum, w| sum + w).scale(0.5)
 }
 
@@ -521,7 +509,7 @@ fn follow<T: Trig, S>(
     set: &Set<S>,
     q: &mut Values<Jet<T>>,
     dependent: &[usize],
-) -> (f64, f64)
+) -> (T::Value, T::Value)
 where
     S: Constant<Jet<T>> + Constant<Dual<T>>,
 {

@@ -53,16 +53,19 @@ pub fn damping_wrench<T: Real>(mech: &Mechanism<impl Constant<T>>, twist: &Twist
 
 /// Cylinder, piston and the rods that the leg leads, carried to the platform \[T14\].
 #[inline(always)]
-fn leg_wrench<T: Real>(
+pub(crate) fn leg_wrench<T: Real>(
     mech: &Mechanism<impl Constant<T>>,
     index: usize,
     leg: &Leg<impl Constant<T>>,
+    place: &leg::Place<T>,
     platform: &Motion<T>,
 ) -> Wrench<T> {
-    let state = leg::state(leg, platform);
+    let state = leg::moving(leg, place, platform);
     let mut wrench = links_wrench(mech, leg, &state);
-    for rod in mech.rods.iter().filter(|rod| rod.leader == index) {
-        wrench = wrench + carried_rod(mech, rod, &state);
+    for rod in &mech.rods {
+        if rod.leader == index {
+            wrench = wrench + carried_rod(mech, rod, &state);
+        }
     }
     wrench
 }
@@ -145,7 +148,7 @@ pub fn resultant<T: Real>(
 ) -> Wrench<T> {
     let mut sum = own_wrench(mech, platform, load);
     for (i, leg) in mech.legs.iter().enumerate() {
-        sum = sum + leg_wrench(mech, i, leg, platform);
+        sum = sum + leg_wrench(mech, i, leg, &leg::place(leg, &platform.pose), platform);
     }
     sum
 }
@@ -179,13 +182,23 @@ pub(crate) fn balanced<T: Real>(
     w: Wrench<T>,
 ) -> ([T; 6], T::Value) {
     let scaled = Wrench::new(w.force, w.torque * T::lit(1.0 / mech.characteristic_length));
-    let solved = solve(columns, scaled.array().map(|x| -x));
+    let mut rhs = scaled.array();
+    for x in &mut rhs {
+        *x = -*x;
+    }
+    let solved = solve(columns, rhs);
     (solved.x, solved.pivots)
 }
 
 #[inline(always)]
 pub(crate) fn transposed<T: Real>(m: &Matrix6<T>) -> Matrix6<T> {
-    std::array::from_fn(|i| std::array::from_fn(|j| m[j][i]))
+    let mut transposed = *m;
+    for i in 0..6 {
+        for j in 0..6 {
+            transposed[i][j] = m[j][i];
+        }
+    }
+    transposed
 }
 
 /// Kinetic and potential energy of all links \[T17\]. Velocities only: with duals along the motion it

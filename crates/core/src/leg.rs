@@ -45,7 +45,10 @@ pub fn hessian<T: Real>(p: &Position<T>) -> Hessian<T> {
     let mut h = [[T::zero(); 6]; 6];
     add_centripetal(&mut h, p.e, p.delta);
     let inverse = T::one() / p.length;
-    let columns = point_columns(p.e).map(|v| v - p.delta * p.delta.dot(v));
+    let mut columns = point_columns(p.e);
+    for v in &mut columns {
+        *v = *v - p.delta * p.delta.dot(*v);
+    }
     for i in 0..6 {
         for j in 0..6 {
             h[i][j] = columns[i].dot(columns[j]).mul_add(inverse, h[i][j]);
@@ -84,7 +87,7 @@ pub fn end<T: Real>(p: &Position<T>, platform: &Motion<T>) -> End<T> {
 
 /// The unit axis behind a leg's frame in base axes, and whether it turns with the platform.
 #[inline(always)]
-fn turning_axis<T: Real>(turning: Turning<impl Constant<T>>, pose: &Pose<T>) -> (Vec3<T>, bool) {
+pub(crate) fn turning_axis<T: Real>(turning: Turning<impl Constant<T>>, pose: &Pose<T>) -> (Vec3<T>, bool) {
     match turning {
         Turning::Across(Side::Platform, u) | Turning::Along(Side::Platform, u) => {
             (pose.rotation * Vec3::lift(u), true)
@@ -202,13 +205,30 @@ pub struct State<T> {
     pub turn: Turn<T>,
 }
 
+/// Where a leg is at a pose, however that moves.
+pub type Place<T> = (Position<T>, Frame<T>);
+
 #[inline(always)]
-pub fn state<T: Real>(leg: &Leg<impl Constant<T>>, platform: &Motion<T>) -> State<T> {
-    let position = position(leg, &platform.pose);
+pub fn place<T: Real>(leg: &Leg<impl Constant<T>>, pose: &Pose<T>) -> Place<T> {
+    let position = position(leg, pose);
+    (position, frame(leg, pose, &position))
+}
+
+/// A leg that is there when the platform moves.
+#[inline(always)]
+pub fn moving<T: Real>(
+    leg: &Leg<impl Constant<T>>,
+    &(position, frame): &Place<T>,
+    platform: &Motion<T>,
+) -> State<T> {
     let end = end(&position, platform);
-    let frame = frame(leg, &platform.pose, &position);
     let turn = turn(leg, platform, &position, &end, &frame);
     State { position, end, frame, turn }
+}
+
+#[inline(always)]
+pub fn state<T: Real>(leg: &Leg<impl Constant<T>>, platform: &Motion<T>) -> State<T> {
+    moving(leg, &place(leg, &platform.pose), platform)
 }
 
 /// Carries a force F at b and a torque M on the leg to the platform: `F·v_b + M·ω_leg` as a wrench at o \[T14\].

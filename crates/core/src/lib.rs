@@ -41,6 +41,8 @@ pub mod spatial;
 pub mod spec;
 pub mod status;
 mod svd;
+pub mod threads;
+pub mod trig;
 pub mod workspace;
 
 // The tests of the modules use the mechanisms of the other tests.

@@ -9,7 +9,7 @@ use crate::clearance::{Hull, Segment, distance};
 use crate::joints::{self, Zero};
 use crate::leg;
 use crate::mechanism::{Leg, Mechanism, Side};
-use crate::real::{Scalar, Trig};
+use crate::real::{Ordered, Real, Scalar, Trig};
 use crate::singularity;
 use crate::spatial::{Pose, Vec3};
 use crate::spec::{JointSpec, LegSpec, LimitsSpec, RodSpec, Spec};
@@ -82,7 +82,7 @@ impl Bound {
             Bound::Most(most) => T::lit(most) - value,
             Bound::Between(min, max) => {
                 let off = joints::wrapped(value - T::lit(0.5 * (min + max)));
-                T::lit(0.5 * (max - min)) - T::select(off.value() < 0.0, -off, off)
+                T::lit(0.5 * (max - min)) - T::select(T::Value::zero().greater(off.value()), -off, off)
             }
         }
     }
@@ -146,14 +146,25 @@ impl Limit {
         }
     }
 
-    /// The measured quantity where the pose alone gives it: none for conditioning and force. No allocation.
+    /// The measured quantity of a limit of a joint; NaN for others.
     #[inline(always)]
-    pub fn geometric<T: Trig>(&self, mech: &Mechanism, pose: &Pose<T>) -> Option<T> {
-        Some(match &self.measure {
+    pub fn of_joint<T: Trig>(&self, mech: &Mechanism, pose: &Pose<T>) -> T {
+        match &self.measure {
             Measure::Length(leg) => leg::position(&mech.legs[*leg], pose).length,
             Measure::Cone(leg, side) => cone(&mech.legs[*leg], *side, pose),
             Measure::Angle(leg, side, zero) => angle(&mech.legs[*leg], *side, zero, pose),
             Measure::RodAngle(rod, zero) => rod_angle(mech, *rod, zero, pose),
+            _ => T::lit(f64::NAN),
+        }
+    }
+
+    /// The measured quantity where the pose alone gives it: none for conditioning and force. No allocation.
+    #[inline(always)]
+    pub fn geometric<T: Trig + Scalar>(&self, mech: &Mechanism, pose: &Pose<T>) -> Option<T> {
+        Some(match &self.measure {
+            Measure::Length(_) | Measure::Cone(..) | Measure::Angle(..) | Measure::RodAngle(..) => {
+                self.of_joint(mech, pose)
+            }
             Measure::Struts([a, b]) => {
                 distance(&a.in_base(mech, pose), &b.in_base(mech, pose)) - T::lit(a.radius + b.radius)
             }
@@ -192,6 +203,7 @@ impl Strut {
     }
 }
 
+#[inline(always)]
 fn cone<T: Trig>(leg: &Leg, side: Side, pose: &Pose<T>) -> T {
     let delta = leg::position(leg, pose).delta;
     match side {
@@ -201,6 +213,7 @@ fn cone<T: Trig>(leg: &Leg, side: Side, pose: &Pose<T>) -> T {
 }
 
 /// Turn of an R joint; of one on a rod, about n.
+#[inline(always)]
 fn angle<T: Trig>(leg: &Leg, side: Side, zero: &Zero, pose: &Pose<T>) -> T {
     let p = leg::position(leg, pose);
     let n = leg::frame(leg, pose, &p).n();
@@ -208,6 +221,7 @@ fn angle<T: Trig>(leg: &Leg, side: Side, zero: &Zero, pose: &Pose<T>) -> T {
     joints::angles_at(leg, side, zero, &pose.rotation, n, p.delta)[usize::from(on_rod)]
 }
 
+#[inline(always)]
 fn rod_angle<T: Trig>(mech: &Mechanism, rod: usize, zero: &Zero, pose: &Pose<T>) -> T {
     let leader = &mech.legs[mech.rods[rod].leader];
     joints::rod_angle(mech, rod, zero, leg::frame(leader, pose, &leg::position(leader, pose)).n())

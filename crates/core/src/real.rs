@@ -3,11 +3,14 @@
 //! [`Real`] is what a kernel may use: field operations, a square root, and [`Real::select`] in place of a branch.
 //! `f64` and [`F`] are numbers; [`Dual`] carries one derivative along, [`Jet`] a rate and a second rate, so that the
 //! same source gives values, exact derivatives and exact time histories.
-//! [`Trig`] adds what only coordinate sets need, [`Scalar`] names the numbers of a single state, which may be branched on.
+//! [`Trig`] adds what only coordinate sets and joint angles need, [`Scalar`] names the numbers of a single state, which may
+//! be branched on.
 //! Complex numbers and lanes of numbers are in [`complex`](crate::complex) and [`lanes`](crate::lanes).
 
 use std::fmt::Debug;
 use std::ops::{Add, Div, Mul, Neg, Sub};
+
+use crate::trig;
 
 /// A number for the kernels: no trigonometry, no branching on values.
 pub trait Real:
@@ -68,6 +71,8 @@ pub trait Ordered: Real<Value = Self> {
     type Mask: Copy;
 
     fn greater(self, than: Self) -> Self::Mask;
+    /// No where they cannot be compared.
+    fn at_most(self, other: Self) -> Self::Mask;
     #[must_use]
     fn abs(self) -> Self;
     /// 1 or -1.
@@ -96,8 +101,8 @@ pub type Mask<T> = <<T as Real>::Value as Ordered>::Mask;
 pub trait Scalar: Real<Value = f64> {}
 impl<T: Real<Value = f64>> Scalar for T {}
 
-/// Trigonometry, for the coordinate sets only.
-pub trait Trig: Scalar {
+/// Trigonometry, for coordinate sets and angles of joints; of plain numbers by [`trig`].
+pub trait Trig: Real {
     fn sin_cos(self) -> (Self, Self);
     #[must_use]
     fn acos(self) -> Self;
@@ -180,6 +185,10 @@ impl Ordered for f64 {
         self > than
     }
     #[inline(always)]
+    fn at_most(self, other: Self) -> bool {
+        self <= other
+    }
+    #[inline(always)]
     fn abs(self) -> Self {
         f64::abs(self)
     }
@@ -189,18 +198,18 @@ impl Ordered for f64 {
     }
 }
 
-impl Trig for f64 {
+impl<T: Ordered> Trig for T {
     #[inline(always)]
     fn sin_cos(self) -> (Self, Self) {
-        f64::sin_cos(self)
+        trig::sin_cos(self)
     }
     #[inline(always)]
     fn acos(self) -> Self {
-        f64::acos(self)
+        trig::acos(self)
     }
     #[inline(always)]
     fn atan2(self, x: Self) -> Self {
-        f64::atan2(self, x)
+        trig::atan2(self, x)
     }
 }
 

@@ -7,7 +7,7 @@ use std::ops::{Add, Mul, Neg, Sub};
 
 use serde::{Deserialize, Serialize};
 
-use crate::real::{Constant, Dual, Real, Scalar, Trig};
+use crate::real::{Constant, Dual, Jet, Real, Scalar, Trig};
 
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(from = "[T; 3]", into = "[T; 3]")]
@@ -90,6 +90,14 @@ impl<T: Real> Vec3<T> {
     pub fn array(self) -> [T; 3] {
         self.into()
     }
+
+    /// The vector with its rate and second rate.
+    #[must_use]
+    #[inline(always)]
+    pub fn with_rates(self, d: Self, dd: Self) -> Vec3<Jet<T>> {
+        let (x, y) = (Jet::new(self.x, d.x, dd.x), Jet::new(self.y, d.y, dd.y));
+        Vec3 { x, y, z: Jet::new(self.z, d.z, dd.z) }
+    }
 }
 
 impl Vec3<f64> {
@@ -164,7 +172,8 @@ impl<T: Real> Mat3<T> {
 
     #[inline(always)]
     pub fn from_rows(m: [[T; 3]; 3]) -> Self {
-        Mat3([0, 1, 2].map(|j| Vec3::new(m[0][j], m[1][j], m[2][j])))
+        let [x, y, z] = m;
+        Mat3([Vec3::new(x[0], y[0], z[0]), Vec3::new(x[1], y[1], z[1]), Vec3::new(x[2], y[2], z[2])])
     }
 
     pub fn rows(self) -> [[T; 3]; 3] {
@@ -224,11 +233,12 @@ impl<T: Real> Mat3<T> {
         let w = a.cross(b);
         let k = T::one() / (T::one() + a.dot(b));
         // 1 + [w] + [w]² / (1 + a·b)
-        let column = |e: Vec3<T>| {
-            let we = w.cross(e);
-            e + we + w.cross(we) * k
-        };
-        Mat3(Mat3::identity().0.map(column))
+        let mut columns = Mat3::identity().0;
+        for e in &mut columns {
+            let we = w.cross(*e);
+            *e = *e + we + w.cross(we) * k;
+        }
+        Mat3(columns)
     }
 }
 
@@ -262,13 +272,16 @@ impl<T: Real> Mat3<T> {
         let half = T::lit(0.5);
         let products = self.transpose() * self;
         let identity = Mat3::identity();
-        let excess = Mat3([0, 1, 2].map(|j| (products.0[j] - identity.0[j]) * half));
-        let correction = self * excess;
-        Mat3([0, 1, 2].map(|j| self.0[j] - correction.0[j]))
+        let mut columns = self.0;
+        for j in 0..3 {
+            let excess = (products.0[j] - identity.0[j]) * half;
+            columns[j] = columns[j] - self * excess;
+        }
+        Mat3(columns)
     }
 }
 
-impl<T: Trig> Mat3<T> {
+impl<T: Trig + Scalar> Mat3<T> {
     /// Rodrigues' formula for the turn by |w| about w.
     #[must_use]
     pub fn from_rotation_vector(w: Vec3<T>) -> Self {
@@ -295,17 +308,20 @@ impl Mat3<f64> {
         let (s, c) = (w.norm(), (a.x + b.y + c.z - 1.0) * 0.5);
         if s == 0.0 { w } else { w * (s.atan2(c) / s) }
     }
+}
 
-    /// How far from a rotation: the largest entry of `MᵀM - 1`, or infinity for a mirror image.
-    #[must_use]
-    pub fn rotation_error(self) -> f64 {
+impl<T: Real> Mat3<T> {
+    /// The entries of `MᵀM - 1`, all zero for a rotation or a mirror image.
+    #[inline(always)]
+    pub fn departures(self) -> [T; 6] {
+        let ([a, b, c], one) = (self.0, T::one());
+        [a.dot(a) - one, b.dot(b) - one, c.dot(c) - one, a.dot(b), b.dot(c), c.dot(a)]
+    }
+
+    #[inline(always)]
+    pub fn determinant(self) -> T {
         let [a, b, c] = self.0;
-        let products =
-            [a.dot(a) - 1.0, b.dot(b) - 1.0, c.dot(c) - 1.0, a.dot(b), b.dot(c), c.dot(a)].map(f64::abs);
-        if a.cross(b).dot(c) <= 0.0 {
-            return f64::INFINITY;
-        }
-        products.into_iter().fold(0.0, |m, e| if e > m || e.is_nan() { e } else { m })
+        a.cross(b).dot(c)
     }
 }
 
@@ -395,6 +411,26 @@ pub struct Motion<T> {
     pub pose: Pose<T>,
     pub twist: Twist<T>,
     pub acceleration: Acceleration<T>,
+}
+
+impl<T: Real> Motion<T> {
+    /// The pose with its rate and second rate.
+    #[must_use]
+    #[inline(always)]
+    pub fn jets(&self) -> Pose<Jet<T>> {
+        let Motion { pose, twist, acceleration } = self;
+        let (omega, eps) = (twist.omega, acceleration.eps);
+        let [x, y, z] = pose.rotation.0;
+        // [T2] with the columns of R for e: x' = ω × x, x'' = ε × x + ω × (ω × x)
+        let [x1, y1, z1] = [omega.cross(x), omega.cross(y), omega.cross(z)];
+        let x2 = eps.cross(x) + omega.cross(x1);
+        let y2 = eps.cross(y) + omega.cross(y1);
+        let z2 = eps.cross(z) + omega.cross(z1);
+        Pose {
+            rotation: Mat3([x.with_rates(x1, x2), y.with_rates(y1, y2), z.with_rates(z1, z2)]),
+            o: pose.o.with_rates(twist.v, acceleration.a),
+        }
+    }
 }
 
 macro_rules! six_vector {

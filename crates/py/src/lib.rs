@@ -13,6 +13,7 @@ use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray1};
 use polypod_core::assembly::assemble;
 use polypod_core::batch::{self, Coordinates, Loads, Space, States, Table};
 use polypod_core::coordinates::Set;
+use polypod_core::lanes;
 use polypod_core::limits::Limit;
 use polypod_core::mechanism::Mechanism;
 use polypod_core::modes::{self, Start};
@@ -22,6 +23,7 @@ use polypod_core::roots::{self, Node, Precision};
 use polypod_core::singularity::Kind;
 use polypod_core::spec::{Axes, Fault, Spec};
 use polypod_core::status::Status;
+use polypod_core::threads;
 use pyo3::exceptions::{PyKeyError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -547,6 +549,24 @@ fn statuses() -> Vec<(u8, String, &'static str)> {
     Status::ALL.iter().map(|&s| (s as u8, format!("{s:?}"), s.message())).collect()
 }
 
+/// Threads of batches; 0 for one on each core.
+#[pyfunction]
+fn set_threads(count: usize) {
+    threads::set(count);
+}
+
+/// Names of the instruction sets that batches can use here, the narrowest first.
+#[pyfunction]
+fn instruction_sets() -> Vec<&'static str> {
+    lanes::instruction_sets()
+}
+
+/// Whether this processor has the set; batches then use no wider registers than its.
+#[pyfunction]
+fn use_instructions(name: &str) -> bool {
+    lanes::use_instructions(name)
+}
+
 #[pymodule]
 fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add("__version__", env!("CARGO_PKG_VERSION"))?;
@@ -561,6 +581,9 @@ fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_class::<simulation::PyChart>()?;
     m.add_class::<workspace::PyFlood>()?;
     m.add_class::<workspace::PyLattice>()?;
+    m.add_function(wrap_pyfunction!(set_threads, m)?)?;
+    m.add_function(wrap_pyfunction!(instruction_sets, m)?)?;
+    m.add_function(wrap_pyfunction!(use_instructions, m)?)?;
     m.add_function(wrap_pyfunction!(zeros, m)?)?;
     m.add_function(wrap_pyfunction!(unsettled_zeros, m)?)?;
     m.add_function(wrap_pyfunction!(singularity_kinds, m)?)?;

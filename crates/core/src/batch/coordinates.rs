@@ -1,13 +1,10 @@
 //! Coordinates of many states.
 
 use super::Table;
-use super::checks::{
-    check_acceleration, check_legs, check_pose, check_twist, is_rotation, raw_pose, read_pose, then,
-};
+use super::checks::{check_legs, check_motion, is_rotation, raw_pose, read_pose, then};
 use crate::coordinates::{self, MAX_COORDINATES, Set, State, Values};
 use crate::mechanism::Mechanism;
 use crate::real::Jet;
-use crate::spatial::Motion;
 use crate::status::Status;
 
 /// Given coordinates of the states with their rates and second rates: `given[k]` holds the three series of the
@@ -89,12 +86,11 @@ pub fn states(mech: &Mechanism, input: &Coordinates, n: usize) -> Table {
 
 /// A state is none where a leg has no frame, or where coordinates that were all given break the constraints.
 fn checked(mech: &Mechanism, mut state: State, all_given: bool) -> State {
-    let Motion { pose, twist, acceleration } = &state.platform;
+    let pose = &state.platform.pose;
     // A root that a constraint has only because a leg has no frame there is none.
     state.status = then(state.status, || check_legs(mech, pose));
     if all_given && state.status == Status::Ok {
-        state.status = then(check_pose(mech, pose), || check_twist(mech, pose, twist));
-        state.status = then(state.status, || check_acceleration(mech, pose, twist, acceleration));
+        state.status = check_motion(mech, &state.platform);
     }
     state
 }

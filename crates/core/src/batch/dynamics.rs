@@ -1,13 +1,15 @@
 //! Dynamics of many states.
 
-use super::checks::{check_finite, limit_status, outcome, read_pose, six, then};
+use super::block::{self, Answers, At, Codes, Operation};
+use super::checks::{check_finite, limit_status, outcome, read_pose, six, solved, then, within_limits};
 use super::{FieldId, States, Table};
 use crate::dynamics;
+use crate::lanes::Lanes;
 use crate::leg;
 use crate::mechanism::Mechanism;
 use crate::mobility;
 use crate::real::{Dual, Real};
-use crate::spatial::{Motion, Pose, Twist, Wrench};
+use crate::spatial::{Motion, Pose, Twist, Vec3, Wrench};
 use crate::spec::Axes;
 use crate::status::Status;
 
@@ -19,6 +21,20 @@ pub enum Loads<'a> {
 }
 
 impl Loads<'_> {
+    #[inline(always)]
+    pub(super) fn of<V: Lanes>(&self, mech: &Mechanism, pose: &Pose<V>, at: At) -> Wrench<V> {
+        match self {
+            Loads::Own => {
+                let own =
+                    Wrench::new(Vec3::lift(mech.load.wrench.force), Vec3::lift(mech.load.wrench.torque));
+                dynamics::load_in_base(own, mech.load.axes, pose)
+            }
+            Loads::Given(values, axes) => {
+                dynamics::load_in_base(Wrench::from_array(at.read(values)), *axes, pose)
+            }
+        }
+    }
+
     pub(super) fn at<T: Real>(&self, mech: &Mechanism, pose: &Pose<T>, i: usize) -> Wrench<T> {
         let (wrench, axes) = match self {
             Loads::Own => (mech.load.wrench, mech.load.axes),
@@ -31,31 +47,42 @@ impl Loads<'_> {
 /// Active forces of all legs (zero for passive ones) and multipliers of the independent constraints [Eq. 43].
 #[must_use]
 pub fn inverse_dynamics(mech: &Mechanism, states: &States, loads: &Loads) -> Table {
-    let n = states.len();
-    let (mut table, [forces, multipliers]) =
-        Table::new(n, [("forces", vec![mech.legs.len()]), ("constraint", vec![mech.independent.len()])]);
-    for i in 0..n {
-        let (platform, load, mut status) = states.read_loaded(mech, loads, i);
-        if status == Status::Ok {
-            let (f, pivots) = dynamics::inverse_dynamics(mech, &platform, load);
-            status = outcome(mech, &f, pivots);
-            if status == Status::Ok {
-                status = limit_status(mech, &platform.pose);
-                put_forces(mech, &mut table, forces, i, &f);
-                table.set(multipliers, i, 0, &f[mech.dof()..]);
-            }
-        }
-        table.status[i] = status;
-    }
-    table
+    let fields = [("forces", vec![mech.legs.len()]), ("constraint", vec![mech.independent.len()])];
+    block::table(&InverseDynamics { mech, states, loads }, states.len(), fields)
 }
 
-fn put_forces(mech: &Mechanism, table: &mut Table, field: FieldId, state: usize, forces: &[f64; 6]) {
-    for k in 0..mech.legs.len() {
-        table.set(field, state, k, &[0.0]);
+struct InverseDynamics<'a> {
+    mech: &'a Mechanism,
+    states: &'a States<'a>,
+    loads: &'a Loads<'a>,
+}
+
+impl Operation<2> for InverseDynamics<'_> {
+    #[inline(always)]
+    fn run<V: Lanes>(&self, at: At, answers: &mut Answers<'_, 2>) -> Codes<V> {
+        let (mech, [forces, multipliers]) = (self.mech, Answers::fields());
+        let (platform, load, codes) = self.states.loaded_at(mech, self.loads, at);
+        let (f, pivots) = dynamics::inverse_dynamics(mech, &platform, load);
+        put_forces(mech, answers, forces, &f);
+        for k in 0..mech.independent.len() {
+            answers.put(multipliers, k, [f[mech.dof() + k]]);
+        }
+        within_limits(mech, &platform.pose, solved(mech, &f, pivots, codes))
     }
-    for ((k, _), f) in mech.actuated().zip(forces) {
-        table.set(field, state, k, &[*f]);
+}
+
+/// Active forces of all legs, zero for passive ones.
+#[inline(always)]
+fn put_forces<V: Lanes, const N: usize>(
+    mech: &Mechanism,
+    answers: &mut Answers<'_, N>,
+    field: FieldId,
+    forces: &[V; 6],
+) {
+    let mut row = 0;
+    for (k, leg) in mech.legs.iter().enumerate() {
+        answers.put(field, k, [if leg.actuated { forces[row] } else { V::zero() }]);
+        row += usize::from(leg.actuated);
     }
 }
 

@@ -1,5 +1,6 @@
 //! Many states at once: arrays in, a [`Table`] out, one status per state, NaN where there is no answer.
 
+mod block;
 mod checks;
 mod coordinates;
 mod derivatives;
@@ -25,10 +26,12 @@ pub use singularity::{conditioning, determinants, nearest_singular, searched_coo
 pub use limits::limits;
 pub use reactions::joint_reactions;
 
+use crate::lanes::Lanes;
 use crate::mechanism::Mechanism;
 use crate::spatial::{Acceleration, Motion, Pose, Twist, Wrench};
 use crate::status::Status;
-use checks::{check_acceleration, check_finite, check_twist, read_pose, six, then};
+use block::{At, Codes};
+use checks::{any_pose, check_finite, finite, then, with_legs, with_motion};
 
 /// One output array: its row for a state has the given shape.
 #[derive(Clone, Debug)]
@@ -96,14 +99,33 @@ impl States<'_> {
         self.poses.is_empty()
     }
 
-    /// The state, and whether it is one that the mechanism can be in.
+    /// The states, and whether they are ones that the mechanism can be in.
+    #[inline(always)]
+    fn at<V: Lanes>(&self, mech: &Mechanism, at: At) -> (Motion<V>, Codes<V>) {
+        let (pose, codes) = any_pose(self.poses, at);
+        let twist = Twist::from_array(at.read(self.twists));
+        let platform =
+            Motion { pose, twist, acceleration: Acceleration::from_array(at.read(self.accelerations)) };
+        (platform, with_motion(mech, &platform, with_legs(mech, &pose, codes)))
+    }
+
+    /// The same with the load at them.
+    #[inline(always)]
+    fn loaded_at<V: Lanes>(
+        &self,
+        mech: &Mechanism,
+        loads: &Loads,
+        at: At,
+    ) -> (Motion<V>, Wrench<V>, Codes<V>) {
+        let (platform, codes) = self.at(mech, at);
+        let load = loads.of(mech, &platform.pose, at);
+        (platform, load, codes.unless(finite(&load.array()), Status::InvalidInput))
+    }
+
+    /// A single state, and whether it is one that the mechanism can be in.
     fn read(&self, mech: &Mechanism, i: usize) -> (Motion<f64>, Status) {
-        let (pose, status) = read_pose(mech, self.poses, i);
-        let twist = Twist::from_array(six(self.twists, i));
-        let acceleration = Acceleration::from_array(six(self.accelerations, i));
-        let status = then(status, || check_twist(mech, &pose, &twist));
-        let status = then(status, || check_acceleration(mech, &pose, &twist, &acceleration));
-        (Motion { pose, twist, acceleration }, status)
+        let (platform, codes) = self.at(mech, At::one(i));
+        (platform, codes.status())
     }
 
     /// The same with the load at it.

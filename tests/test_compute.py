@@ -1,0 +1,123 @@
+"""Batches: the same bits alone and together, on one thread and two, on every instruction set."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import polypod as pp
+from polypod import compute
+
+DATA = Path(__file__).parent / "data"
+NAMES = ["lu-3spu-2rpu-r", DATA / "stewart-gough.toml", DATA / "3-rps.toml"]
+
+
+@pytest.fixture(autouse=True)
+def _as_it_was():
+    yield
+    compute.set_threads(0)
+    compute.set_instructions(compute.instruction_sets()[-1])
+
+
+def inputs(mech, count):
+    """Random states about home, some spoilt in one of several ways, a number for each leg, a wrench."""
+    rng = np.random.default_rng(count)
+    set = "natural" if "natural" in mech.coordinate_sets else "pose"
+    names = mech.coordinate_sets[set] if mech.dof > 3 else ("z", "rx", "ry")
+    home = mech.coordinates(mech.home, set)
+    q = {n: home[n] + rng.uniform(-0.05, 0.05, count) for n in names}
+    rates, second = ({n: rng.normal(size=count) for n in names} for _ in range(2))
+    state = mech.state(q, rates, second)
+    assert np.mean(state.status == pp.Status.OK) > 0.9
+    pose, twist, acceleration = (np.array(a) for a in (state.pose, state.twist, state.acceleration))
+    pose[3::11, 0, 0] = np.nan
+    pose[4::11, 0, 1] += 0.1
+    twist[5::11, 2] = np.inf
+    acceleration[6::11] += 1.0
+    return pose, twist, acceleration, rng.normal(size=(count, mech.n_legs)), rng.normal(size=(count, 6))
+
+
+def answers(mech, pose, twist, acceleration, of_legs, wrench):
+    """Arrays of every operation that works in blocks, by name."""
+    parts = {
+        "inverse kinematics": mech.inverse_kinematics(pose),
+        "Jacobian": (mech.jacobian(pose),),
+        "Hessian": (mech.hessian(pose),),
+        "kinematics": mech.kinematics(pose, twist, acceleration),
+        "twist": mech.platform_twist(pose, of_legs),
+        "acceleration": mech.platform_acceleration(pose, twist, of_legs),
+        "inverse dynamics": mech.inverse_dynamics(pose, twist, acceleration),
+        "under load": mech.inverse_dynamics(pose, twist, acceleration, wrench, "platform"),
+        "forward dynamics": mech.forward_dynamics(pose, twist, of_legs, wrench),
+    }
+    return {
+        f"{name} {k}": array
+        for name, arrays in parts.items()
+        for k, array in enumerate(arrays)
+        if isinstance(array, np.ndarray) and array.shape[:1] == pose.shape[:1]
+    }
+
+
+def assert_same(found, expected):
+    for name, array in expected.items():
+        assert found[name].tobytes() == array.tobytes(), name
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_states_together_are_those_alone(name):
+    mech = pp.load(name)
+    states = inputs(mech, 29)
+    whole = answers(mech, *states)
+    assert len(whole) > 30
+    expected = {pp.Status.OK, pp.Status.INVALID_INPUT} | (
+        {pp.Status.OFF_CONSTRAINT} if mech.dof < 6 else set()
+    )
+    assert expected <= {*whole["kinematics 21"]}
+    for size in (1, 2, 7, 8, 9, 17):
+        parts = [answers(mech, *(a[i : i + size] for a in states)) for i in range(0, 29, size)]
+        assert_same({name: np.concatenate([part[name] for part in parts]) for name in whole}, whole)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_threads_change_no_bit(name):
+    mech = pp.load(name)
+    states = inputs(mech, 20_003)
+    compute.set_threads(1)
+    alone = answers(mech, *states)
+    for threads in (2, 3):
+        compute.set_threads(threads)
+        assert_same(answers(mech, *states), alone)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_instructions_change_no_bit(name):
+    mech = pp.load(name)
+    states = inputs(mech, 29)
+    widest = answers(mech, *states)
+    for instructions in compute.instruction_sets()[:-1]:
+        compute.set_instructions(instructions)
+        assert_same(answers(mech, *states), widest)
+
+
+def test_what_means_nothing_is_refused():
+    for count in (-1, 1.5, True, "2"):
+        with pytest.raises(pp.PolypodError, match="whole number"):
+            compute.set_threads(count)
+    with pytest.raises(pp.PolypodError, match="this processor has"):
+        compute.set_instructions("abacus")
+    for variable, value in (("POLYPOD_THREADS", "many"), ("POLYPOD_INSTRUCTIONS", "abacus")):
+        with pytest.raises(pp.PolypodError, match=variable):
+            compute.configure({variable: value})
+    compute.configure({"POLYPOD_THREADS": "2", "POLYPOD_INSTRUCTIONS": compute.instruction_sets()[0]})
+
+
+def test_the_environment_is_read_when_the_package_is_loaded():
+    environment = {**os.environ, "POLYPOD_INSTRUCTIONS": "abacus"}
+    done = subprocess.run(
+        [sys.executable, "-c", "import polypod"], env=environment, capture_output=True, text=True, check=False
+    )
+    assert done.returncode != 0
+    assert "POLYPOD_INSTRUCTIONS" in done.stderr
