@@ -1,9 +1,11 @@
 """Batches: the same bits alone and together, on one thread and two, on every instruction set."""
 
 import os
+import signal
 import subprocess
 import sys
 from pathlib import Path
+from time import sleep
 
 import numpy as np
 import pytest
@@ -100,6 +102,28 @@ def test_instructions_change_no_bit(name):
     for instructions in compute.instruction_sets()[:-1]:
         compute.set_instructions(instructions)
         assert_same(answers(mech, *states), widest)
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork on this system")
+def test_threads_are_made_anew_in_a_forked_process():
+    """Threads do not live on in a fork: who waited for them would wait for ever."""
+    mech = pp.load("lu-3spu-2rpu-r")
+    pose = np.broadcast_to(mech.home, (9000, 4, 4)).copy()
+    compute.set_threads(2)
+    lengths = mech.inverse_kinematics(pose).lengths
+    child = os.fork()
+    if child == 0:
+        same = np.array_equal(mech.inverse_kinematics(pose).lengths, lengths)
+        os._exit(0 if same else 1)
+    for _ in range(300):
+        done, outcome = os.waitpid(child, os.WNOHANG)
+        if done:
+            assert outcome == 0
+            return
+        sleep(0.1)
+    os.kill(child, signal.SIGKILL)
+    os.waitpid(child, 0)
+    pytest.fail("the forked process hangs")
 
 
 def test_what_means_nothing_is_refused():
