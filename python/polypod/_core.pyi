@@ -20,11 +20,14 @@ __all__ = [
     "fit_poses",
     "geometry_parameters",
     "inertial_parameters",
+    "instruction_sets",
     "inverse_dynamics_derivatives",
     "regressor",
+    "set_threads",
     "singularity_kinds",
     "statuses",
     "unsettled_zeros",
+    "use_instructions",
     "zeros",
 ]
 
