@@ -1,4 +1,4 @@
-//! Many states in blocks: what an operation does with one state, it does with one in each lane.
+//! Many states in blocks: what an operation does with one state, it does with one in each lane \[T65\].
 //!
 //! Answers are written into rows, one number of each state side by side, and copied from there into arrays, one state
 //! after the other. So the memory is that of input and output and of one block for each thread, and no state allocates.

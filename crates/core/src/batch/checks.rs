@@ -154,7 +154,7 @@ pub(super) fn with_twist<V: Lanes>(
     codes
 }
 
-/// Whether pose, twist and acceleration keep the constraints: `g = ġ = g̈ = 0`.
+/// Whether pose, twist and acceleration keep the constraints: `g = ġ = g̈ = 0` \[T65\].
 #[inline(always)]
 pub(super) fn with_motion<V: Lanes>(mech: &Mechanism, platform: &Motion<V>, codes: Codes<V>) -> Codes<V> {
     let Motion { pose, twist, acceleration } = platform;
