@@ -20,6 +20,7 @@ pin = pytest.importorskip("pinocchio")
 sys.path.insert(0, str(Path(__file__).parent))
 import test_oracle as cases  # noqa: E402
 from polypod.verify.pinocchio import Tree, Twin  # noqa: E402
+from verified import exceeding, forget_damping, forget_efficiency, mirror_center, rod_center, turn_gravity  # noqa: E402
 
 COLUMNS = 120
 DATA = Path(__file__).parent / "data"
@@ -62,11 +63,6 @@ def draw_states(name, size):
 
 def rows(found):
     return {row.quantity: row for row in found.comparisons[0].rows}
-
-
-def exceeding(found):
-    """The quantities whose errors are beyond the tolerance."""
-    return {row.quantity for row in found.comparisons[0].rows if row.relative_max > found.tolerance}
 
 
 # --- agreement ----------------------------------------------------------------------------------------------
@@ -382,18 +378,6 @@ def test_a_fault_in_an_answer_is_found(monkeypatch, fault):
     assert exceeding(found) == expected
 
 
-def turn_gravity(tables):
-    tables["dynamics"]["gravity"] = [-g for g in tables["dynamics"]["gravity"]]
-
-
-def forget_efficiency(tables):
-    tables["dynamics"]["efficiency"] = 1.0
-
-
-def forget_damping(tables):
-    tables["dynamics"]["angular_damping"] = 0.0
-
-
 def swap_load_axes(tables):
     tables["load"]["axes"] = {"base": "platform", "platform": "base"}[tables["load"]["axes"]]
 
@@ -416,15 +400,6 @@ def transpose_leg_axes(tables):
     swap = np.eye(3)[[2, 1, 0]]
     link = tables["legs"][0]["cylinder"]
     link["inertia"] = (swap @ np.array(link["inertia"]) @ swap.T).tolist()
-
-
-def mirror_center(tables):
-    link = tables["legs"][1]["piston"]
-    link["center"] = [-link["center"][0], *link["center"][1:]]
-
-
-def rod_center(tables):
-    tables["rods"][0]["center"] = [-c for c in tables["rods"][0]["center"]]
 
 
 def move_joint(tables):

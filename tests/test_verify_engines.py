@@ -23,6 +23,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 import test_oracle as cases
 from polypod.verify import exudyn as hard
 from polypod.verify import mujoco as soft
+from verified import exceeding, forget_damping, forget_efficiency, mirror_center, rod_center, turn_gravity
 
 COLUMNS = 120
 LU = "lu-3spu-2rpu-r"
@@ -36,10 +37,6 @@ def lu_states(times=(0.0, 1.3, 3.63)):
     motion = pp.load_motion(LU, mech).sample(times)
     state = mech.state(motion.coordinates, motion.rates, motion.second_rates, branch=motion.branch)
     return mech, (state.pose, state.twist, state.acceleration)
-
-
-def exceeding(found):
-    return {row.quantity for row in found.comparisons[0].rows if row.relative_max > row.tolerance}
 
 
 # --- constraints as rows ------------------------------------------------------------------------------------
@@ -289,27 +286,6 @@ def test_wrong_forces_are_found(monkeypatch, engine):
     wrong = lambda *args: (a := right(*args))._replace(forces=a.forces * (1 + 1e-6))  # noqa: E731
     monkeypatch.setattr(pp.Mechanism, "inverse_dynamics", wrong)
     assert "platform_acceleration" in exceeding(verify_states(mech, *states, engines=[engine]))
-
-
-def turn_gravity(tables):
-    tables["dynamics"]["gravity"] = [-g for g in tables["dynamics"]["gravity"]]
-
-
-def forget_efficiency(tables):
-    tables["dynamics"]["efficiency"] = 1.0
-
-
-def forget_damping(tables):
-    tables["dynamics"]["angular_damping"] = 0.0
-
-
-def mirror_center(tables):
-    link = tables["legs"][1]["piston"]
-    link["center"] = [-link["center"][0], *link["center"][1:]]
-
-
-def rod_center(tables):
-    tables["rods"][0]["center"] = [-c for c in tables["rods"][0]["center"]]
 
 
 @pytest.mark.parametrize("engine", ENGINES)

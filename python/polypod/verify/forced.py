@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from typing import Any
 
 import numpy as np
@@ -19,7 +20,7 @@ LIGHT = 1e-10
 are that times the square of the characteristic length."""
 
 
-class Forced:
+class Forced(ABC):
     """A mechanism in an engine that is given forces; subclasses are `Twin` of their modules."""
 
     def __init__(self, tree: Multibody) -> None:
@@ -27,9 +28,9 @@ class Forced:
         self.links = Links(tree)
         self.numbers = {body.name: i for i, body in enumerate(tree.bodies)}
 
+    @abstractmethod
     def accelerations(self, start: Start, twist: Array, wrench: Array, forces: Array) -> Array | Status:
         """(bodies, 6): of mass centres, of o for the platform, and angular; or why there are none."""
-        raise NotImplementedError
 
     def answer(
         self, pose: Array, twist: Array, wrench: Array, forces: Array

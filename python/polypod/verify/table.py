@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from polypod.errors import MissingEngineError, PolypodError, ShapeError, UnknownNameError
-from polypod.mechanism import Mechanism
+from polypod.mechanism import Mechanism, check_wrench_axes
 from polypod.motion import Motion
 from polypod.solution import states_along
 from polypod.status import Status
@@ -310,8 +310,7 @@ def _states(
     pose: ArrayLike, twist: ArrayLike, acceleration: ArrayLike, wrench: ArrayLike | None, wrench_axes: str
 ) -> States:
     """The arguments as arrays of the right shapes."""
-    if wrench_axes not in ("base", "platform"):
-        raise UnknownNameError("wrench_axes", wrench_axes, ("base", "platform"))
+    check_wrench_axes(wrench_axes)
     poses = np.asarray(pose, dtype=np.float64)
     if poses.ndim != 3 or poses.shape[1:] != (4, 4):
         raise ShapeError(f"pose has the shape {poses.shape}; needs (N, 4, 4)")
