@@ -198,7 +198,7 @@ impl Ordered for f64 {
     }
 }
 
-impl<T: Ordered> Trig for T {
+impl Trig for f64 {
     #[inline(always)]
     fn sin_cos(self) -> (Self, Self) {
         trig::sin_cos(self)

@@ -6,7 +6,7 @@
 use std::mem::MaybeUninit;
 
 use super::{Field, FieldId, Table};
-use crate::lanes::{self, Lanes, Row, Task, WIDTH};
+use crate::lanes::{self, Lanes, Line, Task, WIDTH};
 use crate::status::Status;
 use crate::threads;
 
@@ -96,7 +96,7 @@ impl At {
 
 /// Room for what a block of states answers.
 pub(super) struct Answers<'a, const N: usize> {
-    rows: &'a mut [Row],
+    rows: &'a mut [Line],
     /// The first row of each field.
     starts: &'a [usize; N],
     lane: usize,
@@ -114,7 +114,7 @@ impl<const N: usize> Answers<'_, N> {
         let start = self.starts[field.0] + part * M;
         let rows = &mut self.rows[start..start + M];
         for k in 0..M {
-            values[k].store(&mut rows[k][self.lane..]);
+            values[k].store(&mut rows[k].0[self.lane..]);
         }
     }
 }
@@ -193,7 +193,7 @@ impl<O: Operation<N>, const N: usize> Task for Part<'_, O, N> {
             count += width;
             count - width
         });
-        let mut rows = vec![[0.0; WIDTH]; count];
+        let mut rows = vec![Line([0.0; WIDTH]); count];
         for block in 0..self.status.len().div_ceil(WIDTH) {
             let first = block * WIDTH;
             let status = &mut self.status[first..];
@@ -218,14 +218,14 @@ impl<O: Operation<N>, const N: usize> Task for Part<'_, O, N> {
 
 /// From rows, states side by side, to states one after the other; NaN for those without an answer.
 #[inline(always)]
-fn copy<V: Lanes>(rows: &[Row], status: &[Status], to: &mut [MaybeUninit<f64>]) {
+fn copy<V: Lanes>(rows: &[Line], status: &[Status], to: &mut [MaybeUninit<f64>]) {
     if status.len() == WIDTH && status.iter().all(|status| status.stands()) {
         return V::scatter(rows, to);
     }
     for (lane, (status, places)) in status.iter().zip(to.chunks_exact_mut(rows.len().max(1))).enumerate() {
         if status.stands() {
             for (place, row) in places.iter_mut().zip(rows) {
-                place.write(row[lane]);
+                place.write(row.0[lane]);
             }
         } else {
             for place in places {

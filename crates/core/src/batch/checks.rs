@@ -7,7 +7,7 @@ use crate::lanes::Lanes;
 use crate::leg;
 use crate::limits::{Limit, Measure};
 use crate::mechanism::{Constraint, Mechanism, Turning};
-use crate::real::{Ordered, Real, Trig};
+use crate::real::{Ordered, Real};
 use crate::spatial::{Mat3, Motion, Pose, Twist, Vec3};
 use crate::status::Status;
 
@@ -188,11 +188,7 @@ pub(super) fn check_finite(values: &[f64]) -> Status {
 
 /// The first limit of a joint that a pose breaks.
 #[inline(always)]
-pub(super) fn within_limits<V: Lanes + Trig>(
-    mech: &Mechanism,
-    pose: &Pose<V>,
-    mut codes: Codes<V>,
-) -> Codes<V> {
+pub(super) fn within_limits<V: Lanes>(mech: &Mechanism, pose: &Pose<V>, mut codes: Codes<V>) -> Codes<V> {
     // Both ends of a stroke are limits of one length.
     let (mut measured, mut length) = (usize::MAX, V::zero());
     for limit in joint_limits(mech) {
