@@ -24,6 +24,14 @@ def _as_it_was():
     compute.set_instructions(compute.instruction_sets()[-1])
 
 
+def load(name):
+    """The mechanism with limits of every kind that it may have."""
+    content = pp.load(name).to_dict() | {"limits": {"clearance": 4.0, "sigma_min": 0.02}}
+    for leg in content["legs"]:
+        leg |= {"radius": 10.0, "force": {"min": -2e3, "max": 2e3}}
+    return pp.Mechanism.from_dict(content)
+
+
 def inputs(mech, count):
     """Random states about home, some spoilt in one of several ways, a number for each leg, a wrench."""
     rng = np.random.default_rng(count)
@@ -54,6 +62,7 @@ def answers(mech, pose, twist, acceleration, of_legs, wrench):
         "inverse dynamics": mech.inverse_dynamics(pose, twist, acceleration),
         "under load": mech.inverse_dynamics(pose, twist, acceleration, wrench, "platform"),
         "forward dynamics": mech.forward_dynamics(pose, twist, of_legs, wrench),
+        "limits": mech.limits(pose, wrench, twist=twist, acceleration=acceleration),
     }
     return {
         f"{name} {k}": array
@@ -70,7 +79,7 @@ def assert_same(found, expected):
 
 @pytest.mark.parametrize("name", NAMES)
 def test_states_together_are_those_alone(name):
-    mech = pp.load(name)
+    mech = load(name)
     states = inputs(mech, 29)
     whole = answers(mech, *states)
     assert len(whole) > 30
@@ -85,7 +94,7 @@ def test_states_together_are_those_alone(name):
 
 @pytest.mark.parametrize("name", NAMES)
 def test_threads_change_no_bit(name):
-    mech = pp.load(name)
+    mech = load(name)
     states = inputs(mech, 20_003)
     compute.set_threads(1)
     alone = answers(mech, *states)
@@ -96,7 +105,7 @@ def test_threads_change_no_bit(name):
 
 @pytest.mark.parametrize("name", NAMES)
 def test_instructions_change_no_bit(name):
-    mech = pp.load(name)
+    mech = load(name)
     states = inputs(mech, 29)
     widest = answers(mech, *states)
     for instructions in compute.instruction_sets()[:-1]:

@@ -56,7 +56,7 @@ impl Arrays {
 
 type Operation = fn(&Mechanism, &Arrays) -> Table;
 
-const OPERATIONS: [(&str, Operation); 8] = [
+const OPERATIONS: [(&str, Operation); 9] = [
     ("inverse kinematics", |mech, a| batch::inverse_kinematics(mech, &a.poses)),
     ("Jacobian", |mech, a| batch::jacobians(mech, &a.poses)),
     ("Hessian", |mech, a| batch::hessians(mech, &a.poses)),
@@ -64,6 +64,7 @@ const OPERATIONS: [(&str, Operation); 8] = [
     ("twist", |mech, a| batch::platform_twist(mech, &a.poses, &a.of_legs)),
     ("acceleration", |mech, a| batch::platform_acceleration(mech, &a.poses, &a.twists, &a.of_legs)),
     ("inverse dynamics", |mech, a| batch::inverse_dynamics(mech, &a.states(), &Loads::Own)),
+    ("limits", |mech, a| batch::limits(mech, &a.states(), &Loads::Own)),
     ("forward dynamics", |mech, a| {
         batch::forward_dynamics(mech, &a.poses, &a.twists, &a.of_legs, &Loads::Own)
     }),

@@ -24,7 +24,7 @@ pub(super) trait Operation<const N: usize>: Sync {
     fn run<V: Lanes>(&self, at: At, answers: &mut Answers<'_, N>) -> Codes<V>;
 }
 
-/// The status of each lane, as its number.
+/// The status of each lane, as its number: a negative one where numbers are answered though it does not stand.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Codes<V>(V);
 
@@ -38,14 +38,38 @@ impl<V: Lanes> Codes<V> {
     #[must_use]
     #[inline(always)]
     pub(super) fn unless(self, holds: V::Mask, status: Status) -> Self {
-        let first = V::select(self.0.greater(V::zero()), self.0, V::lit(f64::from(status as u8)));
+        self.or(holds, f64::from(status as u8))
+    }
+
+    /// The same for a status with which the numbers are answered all the same.
+    #[must_use]
+    #[inline(always)]
+    pub(super) fn but(self, holds: V::Mask, status: Status) -> Self {
+        self.or(holds, -f64::from(status as u8))
+    }
+
+    #[inline(always)]
+    fn or(self, holds: V::Mask, code: f64) -> Self {
+        let first = V::select(self.0.abs().greater(V::zero()), self.0, V::lit(code));
         Codes(V::select(holds, self.0, first))
     }
+
+    /// Where all was well so far.
+    #[inline(always)]
+    pub(super) fn well(self) -> V::Mask {
+        self.0.abs().at_most(V::zero())
+    }
+}
+
+/// The status that a code is, and whether there are numbers with it.
+fn read(code: f64) -> (Status, bool) {
+    let status = Status::ALL[code.abs() as usize];
+    (status, code < 0.0 || status.stands())
 }
 
 impl Codes<f64> {
     pub(super) fn status(self) -> Status {
-        Status::ALL[self.0 as usize]
+        read(self.0).0
     }
 }
 
@@ -204,13 +228,14 @@ impl<O: Operation<N>, const N: usize> Task for Part<'_, O, N> {
                 let mut answers = Answers { rows: &mut rows, starts: &starts, lane };
                 self.operation.run::<V>(at, &mut answers).0.store(&mut codes[lane..]);
             }
-            for (status, code) in status.iter_mut().zip(codes) {
-                *status = Status::ALL[code as usize];
+            let mut answered = [false; WIDTH];
+            for lane in 0..held {
+                (status[lane], answered[lane]) = read(codes[lane]);
             }
             for k in 0..N {
                 let (width, start) = (self.widths[k], starts[k]);
                 let places = &mut self.data[k][first * width..];
-                copy::<V>(&rows[start..start + width], &status[..held], places);
+                copy::<V>(&rows[start..start + width], &answered[..held], places);
             }
         }
     }
@@ -218,12 +243,13 @@ impl<O: Operation<N>, const N: usize> Task for Part<'_, O, N> {
 
 /// From rows, states side by side, to states one after the other; NaN for those without an answer.
 #[inline(always)]
-fn copy<V: Lanes>(rows: &[Row], status: &[Status], to: &mut [MaybeUninit<f64>]) {
-    if status.len() == WIDTH && status.iter().all(|status| status.stands()) {
+fn copy<V: Lanes>(rows: &[Row], answered: &[bool], to: &mut [MaybeUninit<f64>]) {
+    if *answered == [true; WIDTH] {
         return V::scatter(rows, to);
     }
-    for (lane, (status, places)) in status.iter().zip(to.chunks_exact_mut(rows.len().max(1))).enumerate() {
-        if status.stands() {
+    for (lane, (answered, places)) in answered.iter().zip(to.chunks_exact_mut(rows.len().max(1))).enumerate()
+    {
+        if *answered {
             for (place, row) in places.iter_mut().zip(rows) {
                 place.write(row[lane]);
             }

@@ -5,7 +5,7 @@ use crate::constraint;
 use crate::forward_dynamics::square;
 use crate::lanes::Lanes;
 use crate::leg;
-use crate::limits::{Limit, Measure};
+use crate::limits::{Limit, Seen};
 use crate::mechanism::{Constraint, Mechanism, Turning};
 use crate::real::{Ordered, Real, Trig};
 use crate::spatial::{Mat3, Motion, Pose, Twist, Vec3};
@@ -193,18 +193,9 @@ pub(super) fn within_limits<V: Lanes + Trig>(
     pose: &Pose<V>,
     mut codes: Codes<V>,
 ) -> Codes<V> {
-    // Both ends of a stroke are limits of one length.
-    let (mut measured, mut length) = (usize::MAX, V::zero());
+    let mut seen = Seen::default();
     for limit in joint_limits(mech) {
-        let value = if let Measure::Length(leg) = limit.measure {
-            if leg != measured {
-                (measured, length) = (leg, leg::position(&mech.legs[leg], pose).length);
-            }
-            length
-        } else {
-            limit.of_joint(mech, pose)
-        };
-        let margin = limit.bound.margin(value);
+        let margin = limit.bound.margin(limit.of_joint(mech, pose, &mut seen));
         codes = codes.unless(V::zero().at_most(margin), limit.status());
     }
     codes
