@@ -27,6 +27,7 @@ def _as_it_was():
 def load(name):
     """The mechanism with limits of every kind that it may have."""
     content = pp.load(name).to_dict() | {"limits": {"clearance": 4.0, "sigma_min": 0.02}}
+    content["units"]["force"] = "N"
     for leg in content["legs"]:
         leg |= {"radius": 10.0, "force": {"min": -2e3, "max": 2e3}}
     return pp.Mechanism.from_dict(content)

@@ -25,10 +25,6 @@ pub const SINGULAR_PIVOTS: f64 = 1e-12;
 /// characteristic length, below which the leg has no frame.
 const LEG_TOLERANCE: f64 = 1e-6;
 
-pub(super) fn six(values: &[f64], i: usize) -> [f64; 6] {
-    std::array::from_fn(|k| values[6 * i + k])
-}
-
 pub(super) fn raw_pose(poses: &[f64], i: usize) -> Pose<f64> {
     pose_of(At::one(i).read(poses))
 }
@@ -117,7 +113,7 @@ fn square_tolerance<V: Lanes>(mech: &Mechanism, c: &Constraint, pose: &Pose<V>) 
 
 /// Whether a pose satisfies the constraints.
 #[inline(always)]
-fn kept<V: Lanes>(mech: &Mechanism, pose: &Pose<V>, mut codes: Codes<V>) -> Codes<V> {
+pub(super) fn kept<V: Lanes>(mech: &Mechanism, pose: &Pose<V>, mut codes: Codes<V>) -> Codes<V> {
     for c in &mech.independent {
         let (value, square) = (constraint::value(c, pose), square_tolerance(mech, c, pose));
         codes = codes.unless((value * value).at_most(nearness(mech, square)), Status::OffConstraint);
@@ -130,10 +126,6 @@ fn kept<V: Lanes>(mech: &Mechanism, pose: &Pose<V>, mut codes: Codes<V>) -> Code
 fn nearness<V: Lanes>(mech: &Mechanism, square: V) -> V {
     let least = constraint::VANISHING_ROW * CONSTRAINT_TOLERANCE;
     square.most(V::lit(least * least)).scale(mech.characteristic_length * mech.characteristic_length)
-}
-
-pub(super) fn check_pose(mech: &Mechanism, pose: &Pose<f64>) -> Status {
-    kept(mech, pose, Codes::ok()).status()
 }
 
 /// Whether a twist keeps the constraints: `ġ = (c, τ)·V = 0`.

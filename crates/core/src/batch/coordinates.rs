@@ -1,6 +1,7 @@
 //! Coordinates of many states.
 
 use super::Table;
+use super::block::{self, Pieces};
 use super::checks::{check_legs, check_motion, is_rotation, raw_pose, read_pose, then};
 use crate::coordinates::{self, MAX_COORDINATES, Set, State, Values};
 use crate::mechanism::Mechanism;
@@ -24,64 +25,65 @@ pub struct Coordinates<'a> {
 #[must_use]
 pub fn states(mech: &Mechanism, input: &Coordinates, n: usize) -> Table {
     let names = input.set.names();
-    let (mut table, [poses, twists, accelerations, values, rates, second_rates]) = Table::new(
-        n,
-        [
-            ("pose", vec![4, 4]),
-            ("twist", vec![6]),
-            ("acceleration", vec![6]),
-            ("coordinates", vec![names.len()]),
-            ("coordinate_rates", vec![names.len()]),
-            ("coordinate_second_rates", vec![names.len()]),
-        ],
-    );
+    let fields = [
+        ("pose", vec![4, 4]),
+        ("twist", vec![6]),
+        ("acceleration", vec![6]),
+        ("coordinates", vec![names.len()]),
+        ("coordinate_rates", vec![names.len()]),
+        ("coordinate_second_rates", vec![names.len()]),
+    ];
+    let [poses, twists, accelerations, values, rates, second_rates] = block::fields();
     let mask: Vec<bool> =
         (0..MAX_COORDINATES).map(|k| k >= names.len() || input.given[k].is_some()).collect();
     let all_given = mask.iter().all(|&given| given) && !mech.independent.is_empty();
-    let (mut last, mut branch) = (mech.home, f64::NAN);
-    for i in 0..n {
-        let q: Values<Jet<f64>> = std::array::from_fn(|k| match input.given.get(k).copied().flatten() {
-            Some([x, d, dd]) => Jet::new(x[i], d[i], dd[i]),
-            None => Jet::new(0.0, 0.0, 0.0),
-        });
-        let guess = match input.guess {
-            Some(poses) if i == 0 || !input.continued => {
-                let k = if poses.len() == 16 { 0 } else { i };
-                if !is_rotation(poses, k) {
-                    table.status[i] = Status::InvalidInput;
-                    continue;
+    let pieces = if input.continued { Pieces::WHOLE } else { Pieces::QUICK };
+    block::in_pieces(n, fields, pieces, |rows, states| {
+        let (mut last, mut branch) = (mech.home, f64::NAN);
+        for i in states {
+            let q: Values<Jet<f64>> = std::array::from_fn(|k| match input.given.get(k).copied().flatten() {
+                Some([x, d, dd]) => Jet::new(x[i], d[i], dd[i]),
+                None => Jet::new(0.0, 0.0, 0.0),
+            });
+            let guess = match input.guess {
+                Some(poses) if i == 0 || !input.continued => {
+                    let k = if poses.len() == 16 { 0 } else { i };
+                    if !is_rotation(poses, k) {
+                        rows.set_status(i, Status::InvalidInput);
+                        continue;
+                    }
+                    raw_pose(poses, k)
                 }
-                raw_pose(poses, k)
+                None if !input.continued => mech.home,
+                _ => last,
+            };
+            let state = coordinates::state(mech, &input.set, &q, &mask, input.branch, &guess);
+            let state = checked(mech, state, all_given);
+            let jumped = input.continued && state.status == Status::Ok && state.branch * branch < 0.0;
+            let status = if jumped { Status::BranchJump } else { state.status };
+            rows.set_status(i, status);
+            let found = state.platform.pose.rotation.0.iter().all(|c| c.norm().is_finite());
+            let solved = found && matches!(status, Status::Ok | Status::Fold);
+            if solved {
+                if state.status == Status::Ok {
+                    (last, branch) = (state.platform.pose, state.branch);
+                }
+                rows.set(poses, i, 0, &state.platform.pose.matrix());
             }
-            None if !input.continued => mech.home,
-            _ => last,
-        };
-        let state = coordinates::state(mech, &input.set, &q, &mask, input.branch, &guess);
-        let state = checked(mech, state, all_given);
-        let jumped = input.continued && state.status == Status::Ok && state.branch * branch < 0.0;
-        table.status[i] = if jumped { Status::BranchJump } else { state.status };
-        let found = state.platform.pose.rotation.0.iter().all(|c| c.norm().is_finite());
-        let solved = found && matches!(table.status[i], Status::Ok | Status::Fold);
-        if solved {
-            if state.status == Status::Ok {
-                (last, branch) = (state.platform.pose, state.branch);
+            if status == Status::Ok {
+                rows.set(twists, i, 0, &state.platform.twist.array());
+                rows.set(accelerations, i, 0, &state.platform.acceleration.array());
             }
-            table.set(poses, i, 0, &state.platform.pose.matrix());
-        }
-        if table.status[i] == Status::Ok {
-            table.set(twists, i, 0, &state.platform.twist.array());
-            table.set(accelerations, i, 0, &state.platform.acceleration.array());
-        }
-        for k in 0..names.len() {
-            if solved || mask[k] {
-                let jet = state.coordinates[k];
-                table.set(values, i, k, &[jet.x]);
-                table.set(rates, i, k, &[jet.d]);
-                table.set(second_rates, i, k, &[jet.dd]);
+            for k in 0..names.len() {
+                if solved || mask[k] {
+                    let jet = state.coordinates[k];
+                    rows.set(values, i, k, &[jet.x]);
+                    rows.set(rates, i, k, &[jet.d]);
+                    rows.set(second_rates, i, k, &[jet.dd]);
+                }
             }
         }
-    }
-    table
+    })
 }
 
 /// A state is none where a leg has no frame, or where coordinates that were all given break the constraints.
@@ -99,13 +101,12 @@ fn checked(mech: &Mechanism, mut state: State, all_given: bool) -> State {
 #[must_use]
 pub fn coordinate_values(mech: &Mechanism, set: &Set, poses: &[f64]) -> Table {
     let n = poses.len() / 16;
-    let (mut table, [values]) = Table::new(n, [("coordinates", vec![set.names().len()])]);
-    for i in 0..n {
+    let (fields, [values]) = ([("coordinates", vec![set.names().len()])], block::fields());
+    block::one_by_one(n, fields, Pieces::QUICK, |rows, i| {
         let (pose, status) = read_pose(mech, poses, i);
-        table.status[i] = status;
         if status == Status::Ok {
-            table.set(values, i, 0, &set.values(mech, &pose)[..set.names().len()]);
+            rows.set(values, i, 0, &set.values(mech, &pose)[..set.names().len()]);
         }
-    }
-    table
+        status
+    })
 }

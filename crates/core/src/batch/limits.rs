@@ -10,12 +10,14 @@ use crate::limits::{Binding, Measure, Seen};
 use crate::mechanism::Mechanism;
 use crate::status::Status;
 
-/// Signed slack of every limit, the same relative to the limit's scale, and the number of the limit that binds \[T35\].
-/// Forces are those of the motion; where they are not determined their margins are NaN and no limit binds.
+/// Signed slack of every limit, the same relative to the limit's scale, the number of the limit that binds, and 1 where
+/// all are kept \[T35\]. Forces are those of the motion; where they are not determined their margins are NaN and no limit
+/// binds.
 #[must_use]
 pub fn limits(mech: &Mechanism, states: &States, loads: &Loads) -> Table {
     let count = mech.limits.len();
-    let fields = [("margins", vec![count]), ("relative", vec![count]), ("binding", vec![])];
+    let fields =
+        [("margins", vec![count]), ("relative", vec![count]), ("binding", vec![]), ("within", vec![])];
     let forces = mech.limits.iter().any(|limit| matches!(limit.measure, Measure::Force { .. }));
     block::table(&Limits { mech, states, loads, forces }, states.len(), fields)
 }
@@ -28,10 +30,10 @@ struct Limits<'a> {
     forces: bool,
 }
 
-impl Operation<3> for Limits<'_> {
+impl Operation<4> for Limits<'_> {
     #[inline(always)]
-    fn run<V: Lanes>(&self, at: At, answers: &mut Answers<'_, 3>) -> Codes<V> {
-        let (mech, [margins, relatives, binding]) = (self.mech, Answers::fields());
+    fn run<V: Lanes>(&self, at: At, answers: &mut Answers<'_, 4>) -> Codes<V> {
+        let (mech, [margins, relatives, binding, within]) = (self.mech, Answers::fields());
         let (platform, load, mut codes) = self.states.loaded_at(mech, self.loads, at);
         let mut forces = [V::lit(f64::NAN); 6];
         if self.forces {
@@ -42,18 +44,21 @@ impl Operation<3> for Limits<'_> {
             }
             codes = codes.but(determined, Status::Singular);
         }
-        let (mut seen, mut binds) = (Seen::default(), Binding::default());
+        let (mut seen, mut binds, mut kept) = (Seen::default(), Binding::default(), V::one());
         for (k, limit) in mech.limits.iter().enumerate() {
             let margin = limit.margin_at(mech, &platform.pose, &forces, &mut seen);
             let relative = margin / V::lit(limit.scale);
             answers.put(margins, k, [margin]);
             answers.put(relatives, k, [relative]);
             binds = binds.or(k, relative);
+            let holds = V::zero().at_most(margin);
+            kept = V::select(holds, kept, V::zero());
             if limit.status() != Status::Ok {
-                codes = codes.unless(V::zero().at_most(margin), limit.status());
+                codes = codes.unless(holds, limit.status());
             }
         }
         answers.put(binding, 0, [binds.limit]);
+        answers.put(within, 0, [kept]);
         codes
     }
 }
