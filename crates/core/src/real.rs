@@ -436,6 +436,10 @@ impl<T: Real> Real for Jet<T> {
         Jet::new(T::lit(x), T::zero(), T::zero())
     }
     #[inline(always)]
+    fn scale(self, x: f64) -> Self {
+        Jet::new(self.x.scale(x), self.d.scale(x), self.dd.scale(x))
+    }
+    #[inline(always)]
     fn value(self) -> T::Value {
         self.x.value()
     }

@@ -57,10 +57,17 @@ impl<V: Lanes> Codes<V> {
         Codes(V::select(holds, self.0, first))
     }
 
-    /// Where all was well so far.
+    /// The same with numbers answered all the same.
+    #[must_use]
     #[inline(always)]
-    pub(super) fn well(self) -> V::Mask {
-        self.0.abs().at_most(V::zero())
+    pub(super) fn answered(self) -> Self {
+        Codes(-self.0.abs())
+    }
+
+    /// Where the status is this one.
+    #[inline(always)]
+    pub(super) fn are(self, status: Status) -> V::Mask {
+        (self.0.abs() - V::lit(f64::from(status as u8))).abs().at_most(V::zero())
     }
 }
 
@@ -114,6 +121,16 @@ impl At {
     #[inline(always)]
     pub(super) fn read_or_zero<V: Lanes, const N: usize>(self, values: &[f64]) -> [V; N] {
         if values.is_empty() { [V::zero(); N] } else { self.read(values) }
+    }
+
+    /// Numbers of which each state has one.
+    #[inline(always)]
+    pub(super) fn series<V: Lanes>(self, values: &[f64]) -> V {
+        if self.first + V::WIDTH <= self.last + 1 {
+            V::load(&values[self.first..])
+        } else {
+            self.read_one(values, 1, 0)
+        }
     }
 
     /// One of the `width` numbers of each state.

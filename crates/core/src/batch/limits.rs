@@ -38,7 +38,7 @@ impl Operation<4> for Limits<'_> {
         let mut forces = [V::lit(f64::NAN); 6];
         if self.forces {
             let (f, pivots) = dynamics::inverse_dynamics(mech, &platform, load);
-            let determined = solved(mech, &f, pivots, Codes::<V>::ok()).well();
+            let determined = solved(mech, &f, pivots, Codes::<V>::ok()).are(Status::Ok);
             for k in 0..6 {
                 forces[k] = V::select(determined, f[k], forces[k]);
             }
