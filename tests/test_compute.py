@@ -24,11 +24,25 @@ def _as_it_was():
     compute.set_instructions(compute.instruction_sets()[-1])
 
 
+def load(name):
+    """The mechanism with limits of every kind that it may have."""
+    content = pp.load(name).to_dict() | {"limits": {"clearance": 4.0, "sigma_min": 0.02}}
+    content["units"]["force"] = "N"
+    for leg in content["legs"]:
+        leg |= {"radius": 10.0, "force": {"min": -2e3, "max": 2e3}}
+    return pp.Mechanism.from_dict(content)
+
+
+def coordinates(mech):
+    """A set and the numbers of it that are given."""
+    set = "natural" if "natural" in mech.coordinate_sets else "pose"
+    return set, mech.coordinate_sets[set] if mech.dof > 3 else ("z", "rx", "ry")
+
+
 def inputs(mech, count):
     """Random states about home, some spoilt in one of several ways, a number for each leg, a wrench."""
     rng = np.random.default_rng(count)
-    set = "natural" if "natural" in mech.coordinate_sets else "pose"
-    names = mech.coordinate_sets[set] if mech.dof > 3 else ("z", "rx", "ry")
+    set, names = coordinates(mech)
     home = mech.coordinates(mech.home, set)
     q = {n: home[n] + rng.uniform(-0.05, 0.05, count) for n in names}
     rates, second = ({n: rng.normal(size=count) for n in names} for _ in range(2))
@@ -44,7 +58,17 @@ def inputs(mech, count):
 
 def answers(mech, pose, twist, acceleration, of_legs, wrench):
     """Arrays of every operation that works in blocks, by name."""
+    set, names = coordinates(mech)
+    found = mech.coordinates(pose, set)
+    q, rates, second = (
+        {name: a[name] if a is found else a[:, k] for k, name in enumerate(names)}
+        for a in (found, twist, acceleration)
+    )
+    state = mech.state(q, rates, second)
     parts = {
+        "coordinates": tuple(found.values()),
+        "state": state,
+        "all coordinates": tuple(state.coordinates.values()),
         "inverse kinematics": mech.inverse_kinematics(pose),
         "Jacobian": (mech.jacobian(pose),),
         "Hessian": (mech.hessian(pose),),
@@ -54,6 +78,7 @@ def answers(mech, pose, twist, acceleration, of_legs, wrench):
         "inverse dynamics": mech.inverse_dynamics(pose, twist, acceleration),
         "under load": mech.inverse_dynamics(pose, twist, acceleration, wrench, "platform"),
         "forward dynamics": mech.forward_dynamics(pose, twist, of_legs, wrench),
+        "limits": mech.limits(pose, wrench, twist=twist, acceleration=acceleration),
     }
     return {
         f"{name} {k}": array
@@ -70,7 +95,7 @@ def assert_same(found, expected):
 
 @pytest.mark.parametrize("name", NAMES)
 def test_states_together_are_those_alone(name):
-    mech = pp.load(name)
+    mech = load(name)
     states = inputs(mech, 29)
     whole = answers(mech, *states)
     assert len(whole) > 30
@@ -85,13 +110,54 @@ def test_states_together_are_those_alone(name):
 
 @pytest.mark.parametrize("name", NAMES)
 def test_threads_change_no_bit(name):
-    mech = pp.load(name)
+    mech = load(name)
     states = inputs(mech, 20_003)
     compute.set_threads(1)
     alone = answers(mech, *states)
     for threads in (2, 3):
         compute.set_threads(threads)
         assert_same(answers(mech, *states), alone)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_threads_change_no_bit_of_what_goes_state_by_state(name):
+    mech = load(name)
+    pose, twist, acceleration, of_legs, wrench = inputs(mech, 100)
+    set, names = coordinates(mech)
+    q = {name: column for name, column in mech.coordinates(pose, set).items() if name in names}
+    lengths = mech.inverse_kinematics(pose).lengths
+
+    def arrays():
+        under_load = (pose, twist, acceleration, wrench, "platform")
+        parts = {
+            "power": mech.power(*under_load),
+            "reactions": mech.joint_reactions(*under_load),
+            "derivatives": mech.inverse_dynamics_derivatives(*under_load),
+            "regressor": mech.regressor(*under_load),
+            "equations of motion": mech.equations_of_motion(pose, twist),
+            "singularity": mech.singularity(pose),
+            "conditioning": mech.conditioning(pose),
+            "determinant": mech.determinant(pose, twist),
+            "nearest": mech.singularity_distance(pose[:9]),
+            "continued": mech.state(q, continued=True),
+            "forward": mech.forward_kinematics(lengths),
+            "modes": mech.assembly_modes(lengths[:2]) if mech.dof == 3 else (),
+        }
+        if set == "natural":
+            parts["coupled"] = mech.coupled_forces(pose, of_legs[:, :1])
+        return {
+            f"{name} {k}": array
+            for name, arrays in parts.items()
+            for k, array in enumerate(arrays)
+            if isinstance(array, np.ndarray)
+        }
+
+    compute.set_threads(1)
+    alone = arrays()
+    assert len(alone) > 60
+    for threads in (2, 3):
+        compute.set_threads(threads)
+        assert_same(arrays(), alone)
 
 
 # Instruction sets without fused multiplication and addition.
@@ -112,7 +178,7 @@ def condition(mech, pose, twist):
 @pytest.mark.parametrize("name", NAMES)
 def test_instructions_change_rounding_only(name):
     """The largest difference of a state's numbers in one operation, against the largest of them."""
-    mech = pp.load(name)
+    mech = load(name)
     states = inputs(mech, 500)
     jacobian, mass = condition(mech, states[0], states[1])
     found = {}

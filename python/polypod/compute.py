@@ -15,8 +15,8 @@ from polypod.errors import PolypodError
 def set_threads(count: int) -> None:
     """Lets batches use this many threads; 0, as at the start, for one on each core.
 
-    The variable POLYPOD_THREADS sets it when the package is loaded. Batches of less than a few thousand
-    states use one.
+    The variable POLYPOD_THREADS sets it when the package is loaded. Batches that are not worth a second
+    thread use one: less than a few thousand states, or a few where a state takes a millisecond.
     """
     if type(count) is not int or count < 0:
         raise PolypodError(f"threads are {count!r}; must be a whole number, 0 for one on each core")

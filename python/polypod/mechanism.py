@@ -1091,18 +1091,22 @@ class Mechanism:
         >>> limits.names[limits.binding], limits.margins.min().round(4), bool(limits.within)
         ('stroke min of leg 2', np.float64(0.0941), True)
         """
-        rest = np.zeros(6)
-        twist, acceleration = (rest if a is None else a for a in (twist, acceleration))
-        shape, args = self._loaded_states(pose, twist, acceleration, wrench, wrench_axes)
+        if twist is None and acceleration is None:
+            shape, (poses, *load) = self._loaded(wrench, wrench_axes, pose=(pose, (4, 4)))
+            args: tuple[Any, ...] = (poses, np.empty(0), np.empty(0), *load)
+        else:
+            rest = np.zeros(6)
+            twist, acceleration = (rest if a is None else a for a in (twist, acceleration))
+            shape, args = self._loaded_states(pose, twist, acceleration, wrench, wrench_axes)
         out = _shaped(self._core.limits(*args), shape)
-        margins, binding, status = out["margins"], out["binding"], out["status"]
+        binding = out["binding"]
         return Limits(
             tuple(limit.name for limit in self.limit_list),
-            margins,
+            out["margins"],
             out["relative"],
             np.where(np.isnan(binding), -1, binding).astype(np.int64),
-            (margins >= 0.0).all(axis=-1) & np.isin(status, [s for s in Status if s.has_answer]),
-            status,
+            out["within"] == 1.0,
+            out["status"],
         )
 
     def coupled_forces(

@@ -8,7 +8,7 @@ use crate::constraint;
 use crate::linear::{Solved, solve};
 use crate::mechanism::{Constraint, ConstraintKind, MAX_CONSTRAINTS, Mechanism};
 use crate::mobility::count;
-use crate::real::{Constant, Dual, Jet, Real, Scalar, Trig};
+use crate::real::{Constant, Dual, Jet, Mask, Ordered, Real, Scalar, Trig};
 use crate::spatial::{Acceleration, Mat3, Motion, Pose, Twist, Vec3};
 use crate::status::Status;
 
@@ -98,16 +98,16 @@ impl<S: Scalar> Set<S> {
         match self {
             Set::Paper(plane) => {
                 // [Eq. 2] R in the order XYX, o = (X_o, Y_o, Z_o)
-                Pose { rotation: plane.rotation(q[3], q[4], q[5]), o: Vec3::new(q[0], q[1], q[2]) }
+                let turns = [q[3].sin_cos(), q[4].sin_cos(), q[5].sin_cos()];
+                Pose { rotation: plane.rotation(turns), o: Vec3::new(q[0], q[1], q[2]) }
             }
             Set::Natural(plane) => {
                 // [T20] middle of b_1 b_3 = point of L + p L + h Rx(α) e_z
                 let [alpha, p, h, beta, gamma, ..] = *q;
-                let rotation = plane.rotation(alpha, beta, gamma);
                 let (s, c) = alpha.sin_cos();
-                let middle =
-                    Vec3::lift(plane.base_point) + Mat3::lift(plane.base) * Vec3::new(p, -(h * s), h * c);
-                Pose { rotation, o: middle - rotation * Vec3::lift(plane.platform_point) }
+                let rotation = plane.rotation([(s, c), beta.sin_cos(), gamma.sin_cos()]);
+                let middle = Vec3::lift(plane.base_point) + times(&plane.base, Vec3::new(p, -(h * s), h * c));
+                Pose { rotation, o: middle - rotation.of(plane.platform_point) }
             }
             Set::Tool => {
                 // [T21] R = (home axis → axis) (turn about the home axis) R_home
@@ -119,10 +119,8 @@ impl<S: Scalar> Set<S> {
                 Pose { rotation, o: Vec3::new(x, y, z) - rotation * Vec3::lift(mech.tool_point) }
             }
             Set::Pose => {
-                let turn = Mat3::rotation_x(q[3].sin_cos())
-                    * Mat3::rotation_y(q[4].sin_cos())
-                    * Mat3::rotation_z(q[5].sin_cos());
-                Pose { rotation: turn, o: Vec3::new(q[0], q[1], q[2]) }
+                let turns = [q[3].sin_cos(), q[4].sin_cos(), q[5].sin_cos()];
+                Pose { rotation: turn_xyz(turns), o: Vec3::new(q[0], q[1], q[2]) }
             }
         }
     }
@@ -250,14 +248,12 @@ impl<S: Scalar> Plane<S> {
 
     /// [Eq. 2] `R = Rx(α) Ry(β) Rx(γ)` between the plane's axes of base and platform.
     #[inline(always)]
-    fn rotation<T: Trig>(&self, alpha: T, beta: T, gamma: T) -> Mat3<T>
+    fn rotation<T: Trig>(&self, turns: [(T, T); 3]) -> Mat3<T>
     where
         S: Constant<T>,
     {
-        let xyx = Mat3::rotation_x(alpha.sin_cos())
-            * Mat3::rotation_y(beta.sin_cos())
-            * Mat3::rotation_x(gamma.sin_cos());
-        Mat3::lift(self.base) * xyx * Mat3::lift(self.platform.transpose())
+        let (xyx, [x, y, z]) = (turn_xyx(turns), self.platform.transpose().0);
+        Mat3([times(&self.base, xyx.of(x)), times(&self.base, xyx.of(y)), times(&self.base, xyx.of(z))])
     }
 }
 
@@ -275,7 +271,7 @@ impl Plane {
     #[inline(always)]
     fn cosine<T: Trig>(&self, o: Vec3<T>, alpha: T) -> T {
         let (s, c) = alpha.sin_cos();
-        let normal = Mat3::lift(self.base) * Vec3::new(T::zero(), c, s);
+        let normal = times(&self.base, Vec3::new(T::zero(), c, s));
         normal.dot(Vec3::lift(self.base_point) - o) / T::lit(self.lever().0)
     }
 
@@ -305,14 +301,49 @@ fn frame_along<S: Scalar>(axis: Vec3<S>) -> Mat3<S> {
     Mat3::from_columns(x, y, x.cross(y))
 }
 
+/// A constant matrix times a vector.
+#[inline(always)]
+fn times<S: Constant<T>, T: Real>(m: &Mat3<S>, a: Vec3<T>) -> Vec3<T> {
+    let [x, y, z] = m.0;
+    Vec3::new(
+        x.x.times(a.x) + y.x.times(a.y) + z.x.times(a.z),
+        x.y.times(a.x) + y.y.times(a.y) + z.y.times(a.z),
+        x.z.times(a.x) + y.z.times(a.y) + z.z.times(a.z),
+    )
+}
+
+/// `Rx(α) Ry(β) Rx(γ)` from sines and cosines.
+#[inline(always)]
+fn turn_xyx<T: Real>([(s1, c1), (s2, c2), (s3, c3)]: [(T, T); 3]) -> Mat3<T> {
+    let (sin, cos) = (c2 * s3, c2 * c3);
+    Mat3::from_rows([
+        [c2, s2 * s3, s2 * c3],
+        [s1 * s2, c1 * c3 - s1 * sin, -(c1 * s3) - s1 * cos],
+        [-(c1 * s2), s1 * c3 + c1 * sin, c1 * cos - s1 * s3],
+    ])
+}
+
+/// `Rx Ry Rz` from sines and cosines.
+#[inline(always)]
+fn turn_xyz<T: Real>([(s1, c1), (s2, c2), (s3, c3)]: [(T, T); 3]) -> Mat3<T> {
+    let (sin, cos) = (s2 * s3, s2 * c3);
+    Mat3::from_rows([
+        [c2 * c3, -(c2 * s3), s2],
+        [c1 * s3 + s1 * cos, c1 * c3 - s1 * sin, -(s1 * c2)],
+        [s1 * s3 - c1 * cos, s1 * c3 + c1 * sin, c1 * c2],
+    ])
+}
+
 /// Rodrigues' formula for a turn about a constant unit axis.
 #[inline(always)]
 fn turn_about<T: Trig>(axis: Vec3<f64>, angle: T) -> Mat3<T> {
     let (s, c) = angle.sin_cos();
-    Mat3([Vec3::X, Vec3::Y, Vec3::Z].map(|e: Vec3<f64>| {
+    let mut columns = Mat3::identity().0;
+    for (column, e) in columns.iter_mut().zip([Vec3::X, Vec3::Y, Vec3::Z]) {
         let along = axis * axis.dot(e);
-        Vec3::lift(along) + Vec3::lift(e - along) * c + Vec3::lift(axis.cross(e)) * s
-    }))
+        *column = Vec3::lift(along) + Vec3::lift(e - along) * c + Vec3::lift(axis.cross(e)) * s;
+    }
+    Mat3(columns)
 }
 
 /// A state of the platform with all numbers of its coordinate set.
@@ -341,23 +372,54 @@ pub fn state(
     let mut q = *q;
     let finite =
         q.iter().zip(given).all(|(c, g)| !g || (c.x.is_finite() && c.d.is_finite() && c.dd.is_finite()));
-    let (status, branch) = match (set, finite) {
-        (_, false) => (Status::InvalidInput, f64::NAN),
-        (Set::Tool, _) if tool_turn(mech, &q) != Status::Ok => (tool_turn(mech, &q), f64::NAN),
-        (Set::Paper(plane), _) => (branch_of_gamma(plane, &mut q, branch), branch),
-        _ => solve_dependent(mech, set, &mut q, given, guess),
+    let failing = if finite { first(complete(mech, set, &mut q, branch)) } else { Status::InvalidInput };
+    let (status, branch) = match (set, failing) {
+        (Set::Paper(_), status) => (status, if finite { branch } else { f64::NAN }),
+        (_, Status::Ok) => solve_dependent(mech, set, &mut q, given, guess),
+        (_, status) => (status, f64::NAN),
     };
     State { coordinates: q, platform: motion(&set.pose(mech, &q)), branch, status }
 }
 
-/// Pose, twist and acceleration of a pose known with its rates \[T19\].
-fn motion<T: Trig>(pose: &Pose<Jet<T>>) -> Motion<T> {
-    let (r, o) = (&pose.rotation, pose.o);
-    Motion {
-        pose: Pose { rotation: Mat3(r.0.map(|c| c.map(|j| j.x))), o: o.map(|j| j.x) },
-        twist: Twist::new(o.map(|j| j.d), half_cross(r, |j| j.d)),
-        acceleration: Acceleration::new(o.map(|j| j.dd), half_cross(r, |j| j.dd)),
+/// What must hold, each with the status where it does not; the first that fails counts.
+pub type Conditions<V> = [(Mask<V>, Status); 2];
+
+fn first(conditions: Conditions<f64>) -> Status {
+    conditions.into_iter().find(|(holds, _)| !holds).map_or(Status::Ok, |(_, status)| status)
+}
+
+/// Puts what the set itself makes dependent, which is γ of [Eq. 5], and tells what must hold for a pose with rates.
+#[inline(always)]
+pub fn complete<V: Ordered>(
+    mech: &Mechanism,
+    set: &Set,
+    q: &mut Values<Jet<V>>,
+    branch: f64,
+) -> Conditions<V> {
+    match set {
+        Set::Paper(plane) => branch_of_gamma(plane, q, branch),
+        Set::Tool => tool_turn(mech, q),
+        _ => [(V::zero().at_most(V::zero()), Status::Ok); 2],
     }
+}
+
+/// Pose, twist and acceleration of a pose known with its rates \[T19\].
+#[inline(always)]
+pub fn motion<T: Real>(pose: &Pose<Jet<T>>) -> Motion<T> {
+    let [x, y, z] = pose.rotation.0;
+    let (values, rates) = ([parts(x)[0], parts(y)[0], parts(z)[0]], [parts(x)[1], parts(y)[1], parts(z)[1]]);
+    let ([o, v, a], second) = (parts(pose.o), [parts(x)[2], parts(y)[2], parts(z)[2]]);
+    Motion {
+        pose: Pose { rotation: Mat3(values), o },
+        twist: Twist::new(v, half_cross(values, rates)),
+        acceleration: Acceleration::new(a, half_cross(values, second)),
+    }
+}
+
+/// Value, rate and second rate.
+#[inline(always)]
+fn parts<T: Real>(a: Vec3<Jet<T>>) -> [Vec3<T>; 3] {
+    [Vec3::new(a.x.x, a.y.x, a.z.x), Vec3::new(a.x.d, a.y.d, a.z.d), Vec3::new(a.x.dd, a.y.dd, a.z.dd)]
 }
 
 /// The numbers of the set with their rates along a motion: the inverse of [`state`].
@@ -395,40 +457,38 @@ where
 }
 
 /// Whether there is a shortest turn from the tool axis at home: not to no direction, and not to the opposite one.
-fn tool_turn(mech: &Mechanism, q: &Values<Jet<f64>>) -> Status {
+#[inline(always)]
+fn tool_turn<V: Ordered>(mech: &Mechanism, q: &Values<Jet<V>>) -> Conditions<V> {
     let axis = Vec3::new(q[3].x, q[4].x, q[5].x);
-    let cosine = axis.dot(mech.home.rotation * mech.tool_axis) / axis.norm();
-    if cosine.is_nan() {
-        Status::InvalidInput
-    } else if 1.0 + cosine < FOLD * FOLD {
-        Status::Fold
-    } else {
-        Status::Ok
-    }
+    let cosine = axis.dot(Vec3::lift(mech.home.rotation * mech.tool_axis)) / axis.norm();
+    [
+        (cosine.at_most(cosine), Status::InvalidInput),
+        (V::lit(FOLD * FOLD).at_most(V::one() + cosine), Status::Fold),
+    ]
 }
 
 /// `½ Σ x_i × x_i'` over the columns of R is ω, `½ Σ x_i × x_i''` is ε \[T19\].
-fn half_cross<T: Real>(r: &Mat3<Jet<T>>, part: fn(Jet<T>) -> T) -> Vec3<T> {
-    r.0.iter().map(|c| c.map(|j| j.x).cross(c.map(part))).fold(Vec3::zero(), |sum, w| sum + w).scale(0.5)
+#[inline(always)]
+fn half_cross<T: Real>([x, y, z]: [Vec3<T>; 3], [dx, dy, dz]: [Vec3<T>; 3]) -> Vec3<T> {
+    (x.cross(dx) + y.cross(dy) + z.cross(dz)).scale(0.5)
 }
 
 /// γ from [Eq. 5]: `γ = ± arccos(...)`, the sign being the branch.
-fn branch_of_gamma(plane: &Plane, q: &mut Values<Jet<f64>>, branch: f64) -> Status {
+#[inline(always)]
+fn branch_of_gamma<V: Ordered>(plane: &Plane, q: &mut Values<Jet<V>>, branch: f64) -> Conditions<V> {
     let cosine = plane.cosine(Vec3::new(q[0], q[1], q[2]), q[3]);
-    let sign = branch.signum();
-    let offset = Jet::lit(plane.lever().1);
-    let nan = Jet::new(f64::NAN, f64::NAN, f64::NAN);
-    if !(cosine.x.abs() <= 1.0 + COSINE_ROUNDING) {
-        q[5] = nan;
-        return Status::NoBranch;
-    }
-    if 1.0 - cosine.x * cosine.x < FOLD * FOLD {
-        let gamma = sign * cosine.x.clamp(-1.0, 1.0).acos();
-        q[5] = Jet::new(gamma, f64::NAN, f64::NAN) - offset;
-        return Status::Fold;
-    }
-    q[5] = Jet::lit(sign) * cosine.acos() - offset;
-    Status::Ok
+    let exists = cosine.x.abs().at_most(V::lit(1.0 + COSINE_ROUNDING));
+    let regular = V::lit(FOLD * FOLD).at_most(V::one() - cosine.x * cosine.x);
+    let inside = cosine.x.most(V::lit(-1.0)).least(V::one());
+    let gamma =
+        Jet::new(inside, cosine.d, cosine.dd).acos().scale(branch.signum()) - Jet::lit(plane.lever().1);
+    let nan = V::lit(f64::NAN);
+    q[5] = Jet::new(
+        V::select(exists, gamma.x, nan),
+        V::select(exists, V::select(regular, gamma.d, nan), nan),
+        V::select(exists, V::select(regular, gamma.dd, nan), nan),
+    );
+    [(exists, Status::NoBranch), (regular, Status::Fold)]
 }
 
 type System<T> = [T; MAX_CONSTRAINTS];

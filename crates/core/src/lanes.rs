@@ -7,7 +7,7 @@
 use std::mem::MaybeUninit;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use crate::real::{Ordered, Trig};
+use crate::real::Ordered;
 
 /// Numbers that go side by side, in as many registers as it takes.
 pub const WIDTH: usize = 8;
@@ -21,7 +21,7 @@ pub type Row = [f64; WIDTH];
 pub struct Line(pub Row);
 
 /// A register of numbers.
-pub trait Lanes: Ordered + Trig {
+pub trait Lanes: Ordered {
     const WIDTH: usize;
 
     /// Whether `mul_add` rounds once.

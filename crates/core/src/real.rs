@@ -66,7 +66,7 @@ pub trait Real:
 }
 
 /// Numbers in an order: one, or one in each lane.
-pub trait Ordered: Real<Value = Self> {
+pub trait Ordered: Real<Value = Self> + Trig {
     /// Yes or no, for each lane.
     type Mask: Copy;
 
@@ -434,6 +434,10 @@ impl<T: Real> Real for Jet<T> {
     #[inline(always)]
     fn lit(x: f64) -> Self {
         Jet::new(T::lit(x), T::zero(), T::zero())
+    }
+    #[inline(always)]
+    fn scale(self, x: f64) -> Self {
+        Jet::new(self.x.scale(x), self.d.scale(x), self.dd.scale(x))
     }
     #[inline(always)]
     fn value(self) -> T::Value {

@@ -8,7 +8,8 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 
 use common::{published, states};
-use polypod_core::batch::{self, Loads, States, Table};
+use polypod_core::batch::{self, Coordinates, Loads, States, Table};
+use polypod_core::coordinates::Set;
 use polypod_core::dynamics;
 use polypod_core::mechanism::Mechanism;
 use polypod_core::spatial::Motion;
@@ -56,7 +57,7 @@ impl Arrays {
 
 type Operation = fn(&Mechanism, &Arrays) -> Table;
 
-const OPERATIONS: [(&str, Operation); 8] = [
+const OPERATIONS: [(&str, Operation); 10] = [
     ("inverse kinematics", |mech, a| batch::inverse_kinematics(mech, &a.poses)),
     ("Jacobian", |mech, a| batch::jacobians(mech, &a.poses)),
     ("Hessian", |mech, a| batch::hessians(mech, &a.poses)),
@@ -64,6 +65,13 @@ const OPERATIONS: [(&str, Operation); 8] = [
     ("twist", |mech, a| batch::platform_twist(mech, &a.poses, &a.of_legs)),
     ("acceleration", |mech, a| batch::platform_acceleration(mech, &a.poses, &a.twists, &a.of_legs)),
     ("inverse dynamics", |mech, a| batch::inverse_dynamics(mech, &a.states(), &Loads::Own)),
+    ("states", |mech, a| {
+        let series = [&a.of_legs[..a.poses.len() / 16]; 3];
+        let given = vec![Some(series), Some(series), Some(series), Some(series), Some(series)];
+        let input = Coordinates { set: Set::of(mech)[1], given, branch: 1.0, guess: None, continued: false };
+        batch::states(mech, &input, series[0].len())
+    }),
+    ("limits", |mech, a| batch::limits(mech, &a.states(), &Loads::Own)),
     ("forward dynamics", |mech, a| {
         batch::forward_dynamics(mech, &a.poses, &a.twists, &a.of_legs, &Loads::Own)
     }),

@@ -498,14 +498,16 @@ impl PyMechanism {
     }
 }
 
+/// Without twists and accelerations all is at rest.
 fn states<'a>(
     poses: &'a Array<'_>,
     twists: &'a Array<'_>,
     accelerations: &'a Array<'_>,
 ) -> PyResult<States<'a>> {
     let (poses, twists, accelerations) = (slice(poses)?, slice(twists)?, slice(accelerations)?);
-    expect(twists, 6, poses)?;
-    expect(accelerations, 6, poses)?;
+    for rates in [twists, accelerations] {
+        expect(rates, if rates.is_empty() { 0 } else { 6 }, poses)?;
+    }
     Ok(States { poses, twists, accelerations })
 }
 

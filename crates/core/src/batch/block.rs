@@ -4,6 +4,9 @@
 //! after the other. So the memory is that of input and output and of one block for each thread, and no state allocates.
 
 use std::mem::MaybeUninit;
+use std::ops::Range;
+
+use rayon::prelude::*;
 
 use super::{Field, FieldId, Table};
 use crate::lanes::{self, Lanes, Line, Task, WIDTH};
@@ -24,7 +27,7 @@ pub(super) trait Operation<const N: usize>: Sync {
     fn run<V: Lanes>(&self, at: At, answers: &mut Answers<'_, N>) -> Codes<V>;
 }
 
-/// The status of each lane, as its number.
+/// The status of each lane, as its number: a negative one where numbers are answered though it does not stand.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Codes<V>(V);
 
@@ -38,14 +41,45 @@ impl<V: Lanes> Codes<V> {
     #[must_use]
     #[inline(always)]
     pub(super) fn unless(self, holds: V::Mask, status: Status) -> Self {
-        let first = V::select(self.0.greater(V::zero()), self.0, V::lit(f64::from(status as u8)));
+        self.or(holds, f64::from(status as u8))
+    }
+
+    /// The same for a status with which the numbers are answered all the same.
+    #[must_use]
+    #[inline(always)]
+    pub(super) fn but(self, holds: V::Mask, status: Status) -> Self {
+        self.or(holds, -f64::from(status as u8))
+    }
+
+    #[inline(always)]
+    fn or(self, holds: V::Mask, code: f64) -> Self {
+        let first = V::select(self.0.abs().greater(V::zero()), self.0, V::lit(code));
         Codes(V::select(holds, self.0, first))
     }
+
+    /// The same with numbers answered all the same.
+    #[must_use]
+    #[inline(always)]
+    pub(super) fn answered(self) -> Self {
+        Codes(-self.0.abs())
+    }
+
+    /// Where the status is this one.
+    #[inline(always)]
+    pub(super) fn are(self, status: Status) -> V::Mask {
+        (self.0.abs() - V::lit(f64::from(status as u8))).abs().at_most(V::zero())
+    }
+}
+
+/// The status that a code is, and whether there are numbers with it.
+fn read(code: f64) -> (Status, bool) {
+    let status = Status::ALL[code.abs() as usize];
+    (status, code < 0.0 || status.stands())
 }
 
 impl Codes<f64> {
     pub(super) fn status(self) -> Status {
-        Status::ALL[self.0 as usize]
+        read(self.0).0
     }
 }
 
@@ -83,6 +117,22 @@ impl At {
         read
     }
 
+    /// The same, zeros if there are none at all.
+    #[inline(always)]
+    pub(super) fn read_or_zero<V: Lanes, const N: usize>(self, values: &[f64]) -> [V; N] {
+        if values.is_empty() { [V::zero(); N] } else { self.read(values) }
+    }
+
+    /// Numbers of which each state has one.
+    #[inline(always)]
+    pub(super) fn series<V: Lanes>(self, values: &[f64]) -> V {
+        if self.first + V::WIDTH <= self.last + 1 {
+            V::load(&values[self.first..])
+        } else {
+            self.read_one(values, 1, 0)
+        }
+    }
+
     /// One of the `width` numbers of each state.
     #[inline(always)]
     pub(super) fn read_one<V: Lanes>(self, values: &[f64], width: usize, number: usize) -> V {
@@ -105,7 +155,7 @@ pub(super) struct Answers<'a, const N: usize> {
 impl<const N: usize> Answers<'_, N> {
     #[inline(always)]
     pub(super) fn fields() -> [FieldId; N] {
-        std::array::from_fn(FieldId)
+        fields()
     }
 
     /// Writes `values` as the `part`-th piece of that size in the field.
@@ -125,6 +175,110 @@ pub(super) fn table<const N: usize>(
     states: usize,
     fields: [(&'static str, Vec<usize>); N],
 ) -> Table {
+    filled(states, fields, Pieces { least: GRAIN, unit: WIDTH }, &|part| {
+        lanes::dispatch(Blocks { operation, part });
+    })
+}
+
+/// How states are shared out: pieces of this many at least, a multiple of the unit.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Pieces {
+    pub least: usize,
+    pub unit: usize,
+}
+
+impl Pieces {
+    /// Of states that take about a microsecond each.
+    pub const QUICK: Self = Pieces { least: 256, unit: 1 };
+    /// Of states that take many.
+    pub const SLOW: Self = Pieces { least: 16, unit: 1 };
+    /// All in one, for states that each need the one before.
+    pub const WHOLE: Self = Pieces { least: usize::MAX, unit: 1 };
+    /// Of states that take a millisecond.
+    pub const EACH: Self = Pieces { least: 1, unit: 1 };
+}
+
+/// The answers for all states, by a function that puts those of one state and tells its status: for operations that
+/// branch or allocate. What it does not put is NaN.
+pub(super) fn one_by_one<const N: usize>(
+    states: usize,
+    fields: [(&'static str, Vec<usize>); N],
+    pieces: Pieces,
+    answer: impl Fn(&mut Rows<'_, N>, usize) -> Status + Sync,
+) -> Table {
+    in_pieces(states, fields, pieces, |rows, piece| {
+        for i in piece {
+            let status = answer(rows, i);
+            rows.set_status(i, status);
+        }
+    })
+}
+
+/// The same for a function that works through a piece of the states, with whatever room it makes for itself.
+pub(super) fn in_pieces<const N: usize>(
+    states: usize,
+    fields: [(&'static str, Vec<usize>); N],
+    pieces: Pieces,
+    answer: impl Fn(&mut Rows<'_, N>, Range<usize>) + Sync,
+) -> Table {
+    filled(states, fields, pieces, &|part: Part<'_, N>| {
+        let (first, count) = (part.first, part.status.len());
+        let data = part.data.map(unknown);
+        answer(&mut Rows { widths: part.widths, first, data, status: part.status }, first..first + count);
+    })
+}
+
+/// What a function answers for each of so many states that take a millisecond each.
+pub(super) fn each<R: Send>(states: usize, answer: impl Fn(usize) -> R + Sync) -> Vec<R> {
+    let mut found = Vec::new();
+    if states > 1 && threads::count() > 1 {
+        threads::install(|| found = (0..states).into_par_iter().map(&answer).collect());
+    } else {
+        found.extend((0..states).map(answer));
+    }
+    found
+}
+
+/// All NaN.
+fn unknown(places: &mut [MaybeUninit<f64>]) -> &mut [f64] {
+    places.fill(MaybeUninit::new(f64::NAN));
+    // SAFETY: all are numbers now.
+    unsafe { &mut *(std::ptr::from_mut(places) as *mut [f64]) }
+}
+
+/// Room for the answers of a piece of the states.
+pub(super) struct Rows<'a, const N: usize> {
+    widths: &'a [usize; N],
+    first: usize,
+    data: [&'a mut [f64]; N],
+    status: &'a mut [Status],
+}
+
+impl<const N: usize> Rows<'_, N> {
+    /// Writes `values` as the `part`-th piece of that size in the state's row.
+    pub(super) fn set(&mut self, field: FieldId, state: usize, part: usize, values: &[f64]) {
+        let start = (state - self.first) * self.widths[field.0] + part * values.len();
+        self.data[field.0][start..start + values.len()].copy_from_slice(values);
+    }
+
+    pub(super) fn set_status(&mut self, state: usize, status: Status) {
+        self.status[state - self.first] = status;
+    }
+}
+
+/// The fields of a table, in order.
+#[inline(always)]
+pub(super) fn fields<const N: usize>() -> [FieldId; N] {
+    std::array::from_fn(FieldId)
+}
+
+/// A table whose parts have each been worked on; work must write every number.
+fn filled<const N: usize>(
+    states: usize,
+    fields: [(&'static str, Vec<usize>); N],
+    pieces: Pieces,
+    work: &(impl Fn(Part<'_, N>) + Sync),
+) -> Table {
     let widths = fields.each_ref().map(|(_, shape)| shape.iter().product());
     let mut data = widths.map(|width: usize| Vec::with_capacity(states * width));
     let mut status = vec![Status::Ok; states];
@@ -133,13 +287,13 @@ pub(super) fn table<const N: usize>(
         let places = data
             .each_mut()
             .map(|data: &mut Vec<f64>| &mut data.spare_capacity_mut()[..states * width.next().unwrap_or(&0)]);
-        let part = Part { operation, widths: &widths, first: 0, states, data: places, status: &mut status };
-        let threads = if states >= 2 * GRAIN { threads::count() } else { 1 };
+        let part = Part { widths: &widths, first: 0, states, data: places, status: &mut status };
+        let threads = if states / 2 >= pieces.least { threads::count() } else { 1 };
         if threads > 1 {
-            let grain = (states / (PARTS * threads)).max(GRAIN);
-            threads::install(|| part.share(grain));
+            let grain = (states / (PARTS * threads)).max(pieces.least);
+            threads::install(|| part.share(grain, pieces.unit, work));
         } else {
-            lanes::dispatch(part);
+            work(part);
         }
     }
     for (data, width) in data.iter_mut().zip(widths) {
@@ -151,8 +305,7 @@ pub(super) fn table<const N: usize>(
 }
 
 /// Some of the states, one after the other.
-struct Part<'a, O, const N: usize> {
-    operation: &'a O,
+struct Part<'a, const N: usize> {
     widths: &'a [usize; N],
     /// The first of them, and the number of all states.
     first: usize,
@@ -161,14 +314,14 @@ struct Part<'a, O, const N: usize> {
     status: &'a mut [Status],
 }
 
-impl<O: Operation<N>, const N: usize> Part<'_, O, N> {
+impl<const N: usize> Part<'_, N> {
     /// Works through the states in pieces of at most `grain`, side by side.
-    fn share(self, grain: usize) {
+    fn share(self, grain: usize, unit: usize, work: &(impl Fn(Part<'_, N>) + Sync)) {
         if self.status.len() <= grain {
-            return lanes::dispatch(self);
+            return work(self);
         }
-        let Part { operation, widths, first, states, data, status } = self;
-        let half = (status.len() / 2).next_multiple_of(WIDTH);
+        let Part { widths, first, states, data, status } = self;
+        let half = (status.len() / 2).next_multiple_of(unit);
         let (status, other_status) = status.split_at_mut(half);
         let mut others: [&mut [MaybeUninit<f64>]; N] = std::array::from_fn(|_| Default::default());
         let mut at = widths.iter().zip(&mut others);
@@ -178,39 +331,46 @@ impl<O: Operation<N>, const N: usize> Part<'_, O, N> {
             *other = rest;
             data
         });
-        let one = Part { operation, widths, first, states, data, status };
-        let other =
-            Part { operation, widths, first: first + half, states, data: others, status: other_status };
-        rayon::join(|| one.share(grain), || other.share(grain));
+        let one = Part { widths, first, states, data, status };
+        let other = Part { widths, first: first + half, states, data: others, status: other_status };
+        rayon::join(|| one.share(grain, unit, work), || other.share(grain, unit, work));
     }
 }
 
-impl<O: Operation<N>, const N: usize> Task for Part<'_, O, N> {
+/// Some of the states in blocks.
+struct Blocks<'a, O, const N: usize> {
+    operation: &'a O,
+    part: Part<'a, N>,
+}
+
+impl<O: Operation<N>, const N: usize> Task for Blocks<'_, O, N> {
     #[inline(always)]
     fn run<V: Lanes>(self) {
+        let Blocks { operation, part } = self;
         let mut count = 0;
-        let starts = self.widths.map(|width| {
+        let starts = part.widths.map(|width| {
             count += width;
             count - width
         });
         let mut rows = vec![Line([0.0; WIDTH]); count];
-        for block in 0..self.status.len().div_ceil(WIDTH) {
+        for block in 0..part.status.len().div_ceil(WIDTH) {
             let first = block * WIDTH;
-            let status = &mut self.status[first..];
+            let status = &mut part.status[first..];
             let held = status.len().min(WIDTH);
             let mut codes = [0.0; WIDTH];
             for lane in (0..held).step_by(V::WIDTH) {
-                let at = At { first: self.first + first + lane, last: self.states - 1 };
+                let at = At { first: part.first + first + lane, last: part.states - 1 };
                 let mut answers = Answers { rows: &mut rows, starts: &starts, lane };
-                self.operation.run::<V>(at, &mut answers).0.store(&mut codes[lane..]);
+                operation.run::<V>(at, &mut answers).0.store(&mut codes[lane..]);
             }
-            for (status, code) in status.iter_mut().zip(codes) {
-                *status = Status::ALL[code as usize];
+            let mut answered = [false; WIDTH];
+            for lane in 0..held {
+                (status[lane], answered[lane]) = read(codes[lane]);
             }
             for k in 0..N {
-                let (width, start) = (self.widths[k], starts[k]);
-                let places = &mut self.data[k][first * width..];
-                copy::<V>(&rows[start..start + width], &status[..held], places);
+                let (width, start) = (part.widths[k], starts[k]);
+                let places = &mut part.data[k][first * width..];
+                copy::<V>(&rows[start..start + width], &answered[..held], places);
             }
         }
     }
@@ -218,12 +378,13 @@ impl<O: Operation<N>, const N: usize> Task for Part<'_, O, N> {
 
 /// From rows, states side by side, to states one after the other; NaN for those without an answer.
 #[inline(always)]
-fn copy<V: Lanes>(rows: &[Line], status: &[Status], to: &mut [MaybeUninit<f64>]) {
-    if status.len() == WIDTH && status.iter().all(|status| status.stands()) {
+fn copy<V: Lanes>(rows: &[Line], answered: &[bool], to: &mut [MaybeUninit<f64>]) {
+    if *answered == [true; WIDTH] {
         return V::scatter(rows, to);
     }
-    for (lane, (status, places)) in status.iter().zip(to.chunks_exact_mut(rows.len().max(1))).enumerate() {
-        if status.stands() {
+    for (lane, (answered, places)) in answered.iter().zip(to.chunks_exact_mut(rows.len().max(1))).enumerate()
+    {
+        if *answered {
             for (place, row) in places.iter_mut().zip(rows) {
                 place.write(row.0[lane]);
             }

@@ -5,7 +5,7 @@ use crate::constraint;
 use crate::forward_dynamics::square;
 use crate::lanes::Lanes;
 use crate::leg;
-use crate::limits::{Limit, Measure};
+use crate::limits::{Limit, Seen};
 use crate::mechanism::{Constraint, Mechanism, Turning};
 use crate::real::{Ordered, Real};
 use crate::spatial::{Mat3, Motion, Pose, Twist, Vec3};
@@ -24,10 +24,6 @@ pub const SINGULAR_PIVOTS: f64 = 1e-12;
 /// Sine of the angle between a leg and the axis of its universal joint, and length of a leg relative to the
 /// characteristic length, below which the leg has no frame.
 const LEG_TOLERANCE: f64 = 1e-6;
-
-pub(super) fn six(values: &[f64], i: usize) -> [f64; 6] {
-    std::array::from_fn(|k| values[6 * i + k])
-}
 
 pub(super) fn raw_pose(poses: &[f64], i: usize) -> Pose<f64> {
     pose_of(At::one(i).read(poses))
@@ -117,7 +113,7 @@ fn square_tolerance<V: Lanes>(mech: &Mechanism, c: &Constraint, pose: &Pose<V>) 
 
 /// Whether a pose satisfies the constraints.
 #[inline(always)]
-fn kept<V: Lanes>(mech: &Mechanism, pose: &Pose<V>, mut codes: Codes<V>) -> Codes<V> {
+pub(super) fn kept<V: Lanes>(mech: &Mechanism, pose: &Pose<V>, mut codes: Codes<V>) -> Codes<V> {
     for c in &mech.independent {
         let (value, square) = (constraint::value(c, pose), square_tolerance(mech, c, pose));
         codes = codes.unless((value * value).at_most(nearness(mech, square)), Status::OffConstraint);
@@ -130,10 +126,6 @@ fn kept<V: Lanes>(mech: &Mechanism, pose: &Pose<V>, mut codes: Codes<V>) -> Code
 fn nearness<V: Lanes>(mech: &Mechanism, square: V) -> V {
     let least = constraint::VANISHING_ROW * CONSTRAINT_TOLERANCE;
     square.most(V::lit(least * least)).scale(mech.characteristic_length * mech.characteristic_length)
-}
-
-pub(super) fn check_pose(mech: &Mechanism, pose: &Pose<f64>) -> Status {
-    kept(mech, pose, Codes::ok()).status()
 }
 
 /// Whether a twist keeps the constraints: `ġ = (c, τ)·V = 0`.
@@ -189,18 +181,9 @@ pub(super) fn check_finite(values: &[f64]) -> Status {
 /// The first limit of a joint that a pose breaks.
 #[inline(always)]
 pub(super) fn within_limits<V: Lanes>(mech: &Mechanism, pose: &Pose<V>, mut codes: Codes<V>) -> Codes<V> {
-    // Both ends of a stroke are limits of one length.
-    let (mut measured, mut length) = (usize::MAX, V::zero());
+    let mut seen = Seen::default();
     for limit in joint_limits(mech) {
-        let value = if let Measure::Length(leg) = limit.measure {
-            if leg != measured {
-                (measured, length) = (leg, leg::position(&mech.legs[leg], pose).length);
-            }
-            length
-        } else {
-            limit.of_joint(mech, pose)
-        };
-        let margin = limit.bound.margin(value);
+        let margin = limit.bound.margin(limit.of_joint(mech, pose, &mut seen));
         codes = codes.unless(V::zero().at_most(margin), limit.status());
     }
     codes

@@ -1,14 +1,14 @@
 //! Dynamics of many states.
 
-use super::block::{self, Answers, At, Codes, Operation};
-use super::checks::{check_finite, limit_status, outcome, read_pose, six, solved, then, within_limits};
+use super::block::{self, Answers, At, Codes, Operation, Pieces};
+use super::checks::{check_finite, limit_status, outcome, read_pose, solved, then, within_limits};
 use super::{FieldId, States, Table};
 use crate::dynamics;
 use crate::lanes::Lanes;
 use crate::leg;
 use crate::mechanism::Mechanism;
 use crate::mobility;
-use crate::real::{Dual, Real};
+use crate::real::Dual;
 use crate::spatial::{Motion, Pose, Twist, Vec3, Wrench};
 use crate::spec::Axes;
 use crate::status::Status;
@@ -23,24 +23,20 @@ pub enum Loads<'a> {
 impl Loads<'_> {
     #[inline(always)]
     pub(super) fn of<V: Lanes>(&self, mech: &Mechanism, pose: &Pose<V>, at: At) -> Wrench<V> {
-        match self {
-            Loads::Own => {
-                let own =
-                    Wrench::new(Vec3::lift(mech.load.wrench.force), Vec3::lift(mech.load.wrench.torque));
-                dynamics::load_in_base(own, mech.load.axes, pose)
-            }
-            Loads::Given(values, axes) => {
-                dynamics::load_in_base(Wrench::from_array(at.read(values)), *axes, pose)
-            }
-        }
+        let (wrench, axes) = self.given(mech, at);
+        dynamics::load_in_base(wrench, axes, pose)
     }
 
-    pub(super) fn at<T: Real>(&self, mech: &Mechanism, pose: &Pose<T>, i: usize) -> Wrench<T> {
-        let (wrench, axes) = match self {
-            Loads::Own => (mech.load.wrench, mech.load.axes),
-            Loads::Given(values, axes) => (Wrench::from_array(six(values, i)), *axes),
-        };
-        dynamics::load_in_base(Wrench::from_array(wrench.array().map(T::lit)), axes, pose)
+    /// As they are given, with their axes.
+    #[inline(always)]
+    pub(super) fn given<V: Lanes>(&self, mech: &Mechanism, at: At) -> (Wrench<V>, Axes) {
+        match self {
+            Loads::Own => {
+                let own = mech.load.wrench;
+                (Wrench::new(Vec3::lift(own.force), Vec3::lift(own.torque)), mech.load.axes)
+            }
+            Loads::Given(values, axes) => (Wrench::from_array(at.read(values)), *axes),
+        }
     }
 }
 
@@ -98,21 +94,22 @@ pub fn coupled_forces(
     let (pair, axis, platform_axis) = mobility::coupled_pair(mech)?;
     let index = mech.independent.iter().position(|c| pair.contains(&c.leg))?;
     let (n, k) = (poses.len() / 16, mech.independent.len());
-    let (mut table, [forces, torque]) = Table::new(n, [("forces", vec![2]), ("torque", vec![])]);
-    for i in 0..n {
+    let (fields, [forces, torque]) = ([("forces", vec![2]), ("torque", vec![])], block::fields());
+    let table = block::one_by_one(n, fields, Pieces::QUICK, |rows, i| {
         let (pose, status) = read_pose(mech, poses, i);
         let f_c = multipliers[i * k + index];
-        table.status[i] = then(status, || check_finite(&[f_c]));
-        if table.status[i] == Status::Ok {
-            let c = dynamics::coupled_forces(mech, pair, axis, platform_axis, &pose, f_c, as_printed);
-            if c.forces.iter().all(|f| f.is_finite()) {
-                table.set(forces, i, 0, &c.forces);
-                table.set(torque, i, 0, &[c.torque]);
-            } else {
-                table.status[i] = Status::Singular;
-            }
+        let status = then(status, || check_finite(&[f_c]));
+        if status != Status::Ok {
+            return status;
         }
-    }
+        let c = dynamics::coupled_forces(mech, pair, axis, platform_axis, &pose, f_c, as_printed);
+        if !c.forces.iter().all(|f| f.is_finite()) {
+            return Status::Singular;
+        }
+        rows.set(forces, i, 0, &c.forces);
+        rows.set(torque, i, 0, &[c.torque]);
+        Status::Ok
+    });
     Some((pair, table))
 }
 
@@ -131,13 +128,13 @@ pub fn power(mech: &Mechanism, states: &States, loads: &Loads) -> Table {
         "friction",
         "residual",
     ];
-    let (mut table, ids) = Table::new(n, names.map(|name| (name, vec![])));
-    for i in 0..n {
-        let (platform, wrench, status) = states.read_loaded(mech, loads, i);
+    let ids: [FieldId; 9] = block::fields();
+    let fields = names.map(|name| (name, vec![]));
+    block::one_by_one(n, fields, Pieces::QUICK, |rows, i| {
+        let (platform, wrench, status) = states.one(mech, loads, i);
         let Motion { pose, twist, .. } = &platform;
-        table.status[i] = status;
-        if table.status[i] != Status::Ok {
-            continue;
+        if status != Status::Ok {
+            return status;
         }
         let (kinetic, potential) = energy_along(mech, &platform);
         let load = wrench.power(twist);
@@ -145,8 +142,8 @@ pub fn power(mech: &Mechanism, states: &States, loads: &Loads) -> Table {
             + mech.angular_damping * twist.omega.dot(twist.omega));
         let (f, pivots) = dynamics::inverse_dynamics(mech, &platform, wrench);
         let rates = mech.actuated().map(|(_, leg)| leg::row(&leg::position(leg, pose)).power(twist));
-        table.status[i] = then(outcome(mech, &f, pivots), || limit_status(mech, pose));
-        let singular = table.status[i] == Status::Singular;
+        let status = then(outcome(mech, &f, pivots), || limit_status(mech, pose));
+        let singular = status == Status::Singular;
         let actuators = if singular { f64::NAN } else { rates.zip(&f).map(|(rate, f)| rate * f).sum() };
         // What the efficiency takes: actuators serve the platform's term of [Eq. 42] 1/η times.
         let own = (wrench + dynamics::platform_wrench(mech, &platform)).power(twist);
@@ -154,11 +151,11 @@ pub fn power(mech: &Mechanism, states: &States, loads: &Loads) -> Table {
         let residual = actuators + load + damping + friction - kinetic.d - potential.d;
         let values =
             [kinetic.x, potential.x, kinetic.d, potential.d, actuators, load, damping, friction, residual];
-        for (id, value) in ids.iter().zip(values) {
-            table.set(*id, i, 0, &[value]);
+        for (id, value) in ids.into_iter().zip(values) {
+            rows.set(id, i, 0, &[value]);
         }
-    }
-    table
+        status
+    })
 }
 
 /// Kinetic and potential energy as duals along the motion.

@@ -1,6 +1,6 @@
 //! Forward dynamics of many states.
 
-use super::block::{self, Answers, At, Codes, Operation};
+use super::block::{self, Answers, At, Codes, Operation, Pieces, Rows};
 use super::checks::{SINGULAR_PIVOTS, actuated, finite, limit_status, pose_at, with_twist, within_limits};
 use super::dynamics::Loads;
 use super::{FieldId, Table};
@@ -86,30 +86,26 @@ impl Space {
 #[must_use]
 pub fn equations_of_motion(mech: &Mechanism, poses: &[f64], twists: &[f64], space: &Space) -> Table {
     let (n, d) = (poses.len() / 16, space.size());
-    let (mut table, ids) = Table::new(
-        n,
-        [
-            ("mass", vec![d, d]),
-            ("coriolis", vec![d, d]),
-            ("damping", vec![d, d]),
-            ("gravity", vec![d]),
-            ("twist_jacobian", vec![6, d]),
-            ("leg_jacobian", vec![mech.legs.len(), d]),
-            ("rates", vec![d]),
-        ],
-    );
-    for i in 0..n {
+    let fields = [
+        ("mass", vec![d, d]),
+        ("coriolis", vec![d, d]),
+        ("damping", vec![d, d]),
+        ("gravity", vec![d]),
+        ("twist_jacobian", vec![6, d]),
+        ("leg_jacobian", vec![mech.legs.len(), d]),
+        ("rates", vec![d]),
+    ];
+    block::one_by_one(n, fields, Pieces::SLOW, |rows, i| {
         let (pose, twist, status) = read(mech, poses, twists, i);
         let found = if status == Status::Ok { equations(mech, &pose, &twist, space) } else { Err(status) };
-        table.status[i] = match found {
+        match found {
             Ok((e, rates)) => {
-                put(mech, &mut table, ids, i, (&e, &rates), &pose);
+                put(mech, rows, i, (&e, &rates), &pose);
                 limit_status(mech, &pose)
             }
             Err(status) => status,
-        };
-    }
-    table
+        }
+    })
 }
 
 fn equations(
@@ -131,29 +127,28 @@ fn equations(
 
 fn put(
     mech: &Mechanism,
-    table: &mut Table,
-    ids: [FieldId; 7],
+    rows: &mut Rows<'_, 7>,
     i: usize,
     (e, rates): (&Equations<f64>, &[f64; 6]),
     pose: &Pose<f64>,
 ) {
-    let d = e.count;
+    let (d, ids): (_, [FieldId; 7]) = (e.count, block::fields());
     for (id, matrix) in ids.into_iter().zip([&e.mass, &e.coriolis, &e.damping]) {
         for (k, row) in matrix[..d].iter().enumerate() {
-            table.set(id, i, k, &row[..d]);
+            rows.set(id, i, k, &row[..d]);
         }
     }
-    table.set(ids[3], i, 0, &e.gravity[..d]);
+    rows.set(ids[3], i, 0, &e.gravity[..d]);
     for (j, twist) in e.twists[..d].iter().enumerate() {
         for (k, x) in twist.array().into_iter().enumerate() {
-            table.set(ids[4], i, k * d + j, &[x]);
+            rows.set(ids[4], i, k * d + j, &[x]);
         }
     }
     for (k, leg) in mech.legs.iter().enumerate() {
         let row = leg::row(&leg::position(leg, pose));
         for (j, twist) in e.twists[..d].iter().enumerate() {
-            table.set(ids[5], i, k * d + j, &[row.power(twist)]);
+            rows.set(ids[5], i, k * d + j, &[row.power(twist)]);
         }
     }
-    table.set(ids[6], i, 0, &rates[..d]);
+    rows.set(ids[6], i, 0, &rates[..d]);
 }
