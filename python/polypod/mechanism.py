@@ -1163,9 +1163,11 @@ class Mechanism:
     @staticmethod
     def _batch(**arguments: tuple[ArrayLike, tuple[int, ...]]) -> tuple[tuple[int, ...], list[Array]]:
         """The common leading shape of arrays with the given trailing shapes, and the arrays spread to it."""
-        arrays = {name: _array(name, value, core) for name, (value, core) in arguments.items()}
-        shape = _broadcast(*(a.shape[: a.ndim - len(arguments[name][1])] for name, a in arrays.items()))
-        return shape, [_spread(a, shape, arguments[name][1]) for name, a in arrays.items()]
+        arrays = [_array(name, value, core) for name, (value, core) in arguments.items()]
+        cores = [core for _, core in arguments.values()]
+        shapes = [a.shape[: a.ndim - len(core)] for a, core in zip(arrays, cores, strict=True)]
+        shape = _broadcast(*shapes)
+        return shape, [_spread(a, shape, core) for a, core in zip(arrays, cores, strict=True)]
 
 
 def _plain(value: Any) -> Any:
@@ -1213,6 +1215,8 @@ def _array(name: str, value: ArrayLike, core: tuple[int, ...]) -> Array:
 
 
 def _broadcast(*shapes: tuple[int, ...]) -> tuple[int, ...]:
+    if all(shape == shapes[0] for shape in shapes):
+        return shapes[0]  # the plain case, without numpy's delay
     try:
         return np.broadcast_shapes(*shapes)
     except ValueError:
@@ -1221,11 +1225,14 @@ def _broadcast(*shapes: tuple[int, ...]) -> tuple[int, ...]:
 
 def _spread(array: Array, shape: tuple[int, ...], core: tuple[int, ...]) -> Array:
     """Flat and contiguous, one row for each state."""
-    return np.ascontiguousarray(np.broadcast_to(array, shape + core)).reshape(-1)
+    whole = shape + core
+    return np.ascontiguousarray(array if array.shape == whole else np.broadcast_to(array, whole)).reshape(-1)
 
 
 def _shaped(table: Mapping[str, NDArray[Any]], shape: tuple[int, ...]) -> dict[str, NDArray[Any]]:
     """The core's arrays with the batch's own leading axes."""
+    if len(shape) == 1:
+        return dict(table)
     return {name: array.reshape(shape + array.shape[1:]) for name, array in table.items()}
 
 

@@ -25,12 +25,17 @@ pub(crate) fn inertial_force<T: Real>(body: &Body, gravity: Vec3<T>, a: Vec3<T>)
     (gravity - a) * T::lit(body.mass)
 }
 
-/// Inertial torque `t = -(I ε + ω × I ω)` with the inertia turned into base axes [Eq. 40, completed] \[T13\].
+/// Inertial torque `t = -(I ε + ω × I ω)` in the link's own axes [Eq. 40, completed] \[T13\].
 #[inline(always)]
-pub(crate) fn inertial_torque<T: Real>(body: &Body, axes: Mat3<T>, omega: Vec3<T>, eps: Vec3<T>) -> Vec3<T> {
-    let inertia = Mat3::lift(body.inertia);
-    let (omega, eps) = (axes.transpose_mul(omega), axes.transpose_mul(eps));
-    -(axes * (inertia * eps + omega.cross(inertia * omega)))
+pub(crate) fn turning_torque<T: Real>(inertia: Mat3<f64>, omega: Vec3<T>, eps: Vec3<T>) -> Vec3<T> {
+    let inertia = Mat3::lift(inertia);
+    -(inertia * eps + omega.cross(inertia * omega))
+}
+
+/// The same of a link with the given axes, all in base axes.
+#[inline(always)]
+fn inertial_torque<T: Real>(body: &Body, axes: Mat3<T>, omega: Vec3<T>, eps: Vec3<T>) -> Vec3<T> {
+    axes * turning_torque(body.inertia, axes.transpose_mul(omega), axes.transpose_mul(eps))
 }
 
 /// The platform's own term of [Eq. 42]: weight, inertia and damping, as a wrench at o.
@@ -70,22 +75,32 @@ pub(crate) fn leg_wrench<T: Real>(
     wrench
 }
 
-/// Cylinder and piston, carried to the platform.
+/// Cylinder and piston, carried to the platform. All along n, δ, m.
 #[inline(always)]
 pub(crate) fn links_wrench<T: Real>(
     mech: &Mechanism<impl Constant<T>>,
     leg: &Leg<impl Constant<T>>,
     state: &leg::State<T>,
 ) -> Wrench<T> {
-    let gravity = Vec3::lift(mech.gravity);
-    let (f, turn) = (&state.frame, &state.turn);
-    let (piston, cylinder) = (leg::piston(leg, state), leg::cylinder(leg, state));
-    let force = inertial_force(&leg.piston, gravity, piston.acceleration);
-    let torque = piston.offset.cross(force)
-        + cylinder.offset.cross(inertial_force(&leg.cylinder, gravity, cylinder.acceleration))
-        + inertial_torque(&leg.piston, f.axes, turn.omega, turn.eps)
-        + inertial_torque(&leg.cylinder, f.axes, turn.omega, turn.eps);
-    leg::carry(leg, state, force, torque)
+    let axes = state.frame.axes;
+    let at_base = axes.transpose_mul(Vec3::lift(mech.gravity));
+    let at_b = at_base - axes.transpose_mul(state.end.a_b);
+    let (force, about_b) = turning_force(&leg.piston, &state.turn, at_b);
+    let (_, about_base) = turning_force(&leg.cylinder, &state.turn, at_base);
+    // Both turn as one.
+    let inertia = leg.piston.inertia + leg.cylinder.inertia;
+    let torque = turning_torque(inertia, state.turn.omega, state.turn.eps);
+    leg::carry(leg, state, force, torque + about_b + about_base)
+}
+
+/// Weight and inertial force of a link of a leg \[T8\] \[T13\], and its torque about the link's reference point;
+/// `push` is gravity less the acceleration of that point.
+#[inline(always)]
+fn turning_force<T: Real>(body: &Body, turn: &leg::Turn<T>, push: Vec3<T>) -> (Vec3<T>, Vec3<T>) {
+    let center = Vec3::lift(body.center);
+    let force =
+        inertial_force(body, push, turn.eps.cross(center) + turn.omega.cross(turn.omega.cross(center)));
+    (force, center.cross(force))
 }
 
 /// A rod, carried to the platform by the leg that leads it.
@@ -219,7 +234,7 @@ pub fn energy<T: Real>(mech: &Mechanism<impl Constant<T>>, pose: &Pose<T>, twist
     let mut add = |(kinetic, potential): (T, T)| sum = (sum.0 + kinetic, sum.1 + potential);
     for (i, leg) in mech.legs.iter().enumerate() {
         let state = leg::state(leg, &platform);
-        let (axes, omega) = (state.frame.axes, state.turn.omega);
+        let (axes, omega) = (state.frame.axes, state.omega());
         let base = Vec3::lift(leg.base.point);
         let (piston, cylinder) = (leg::piston(leg, &state), leg::cylinder(leg, &state));
         add(link(&leg.piston, axes, omega, piston.velocity, base + state.position.r + piston.offset));

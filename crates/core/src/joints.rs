@@ -43,7 +43,7 @@ pub fn angles<T: Trig>(
     platform: &Motion<T>,
     state: &State<T>,
 ) -> [JointAngles<T>; 2] {
-    let (n, delta, omega) = (state.frame.n(), state.position.delta, state.turn.omega);
+    let (n, delta, omega) = (state.frame.n(), state.position.delta, state.omega());
     let rotation = &platform.pose.rotation;
     // Seen from the leg the platform turns the other way.
     let outer = platform.twist.omega - omega;

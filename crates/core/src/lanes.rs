@@ -1,7 +1,8 @@
 //! Several numbers side by side, one in each lane of a vector register.
 //!
-//! Every operation is that of the double, lane by lane and without fusing, so that results are the same bits whatever
-//! the width. [`dispatch`] picks the widest registers that the processor has when the program runs.
+//! Every operation is that of the double, lane by lane; `mul_add` is fused where the processor has such an instruction
+//! ([`Lanes::FUSED`]). So results are the same bits on all registers that fuse, and on all that do not. [`dispatch`] picks
+//! the widest registers that the processor has when the program runs.
 
 use std::mem::MaybeUninit;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -14,9 +15,17 @@ pub const WIDTH: usize = 8;
 /// One number of each.
 pub type Row = [f64; WIDTH];
 
+/// A row that lies in one line of the cache.
+#[derive(Clone, Copy, Debug)]
+#[repr(align(64))]
+pub struct Line(pub Row);
+
 /// A register of numbers.
 pub trait Lanes: Ordered {
     const WIDTH: usize;
+
+    /// Whether `mul_add` rounds once.
+    const FUSED: bool;
 
     /// The first [`Lanes::WIDTH`] numbers.
     fn load(from: &[f64]) -> Self;
@@ -41,11 +50,11 @@ pub trait Lanes: Ordered {
 
     /// From rows of [`WIDTH`] states side by side to states one after the other, each with a number of every row.
     #[inline(always)]
-    fn scatter(rows: &[Row], states: &mut [MaybeUninit<f64>]) {
+    fn scatter(rows: &[Line], states: &mut [MaybeUninit<f64>]) {
         let states = &mut states[..rows.len() * WIDTH];
         for lane in 0..WIDTH {
             for k in 0..rows.len() {
-                states[lane * rows.len() + k].write(rows[k][lane]);
+                states[lane * rows.len() + k].write(rows[k].0[lane]);
             }
         }
     }
@@ -54,6 +63,7 @@ pub trait Lanes: Ordered {
 /// The register of a processor without vectors.
 impl Lanes for f64 {
     const WIDTH: usize = 1;
+    const FUSED: bool = false;
     #[inline(always)]
     fn load(from: &[f64]) -> Self {
         from[0]
@@ -91,7 +101,7 @@ pub fn instruction_sets() -> Vec<&'static str> {
     SETS.iter().filter(|(_, width)| *width <= widest).map(|(name, _)| *name).collect()
 }
 
-/// Lets tasks use no wider registers than those of this set; whether the processor has it. Answers do not depend on it.
+/// Lets tasks use no wider registers than those of this set; whether the processor has it.
 pub fn use_instructions(name: &str) -> bool {
     let known = instruction_sets().contains(&name);
     if let (true, Some((_, width))) = (known, SETS.iter().find(|(set, _)| *set == name)) {
@@ -114,9 +124,10 @@ pub fn dispatch(task: impl Task) {
 /// The operations of a register by the instructions that make them.
 macro_rules! register {
     (
-        $(#[$doc:meta])* $name:ident($vector:ty), $width:literal, $mask:ty;
+        $(#[$doc:meta])* $name:ident($vector:ty), $width:literal, $mask:ty, $features:literal, fused $fused:literal;
         $add:ident $sub:ident $mul:ident $div:ident $sqrt:ident $splat:ident $load:ident $store:ident;
         neg |$n:ident| $neg:expr;
+        mul_add |$m:ident, $by:ident, $plus:ident| $mul_add:expr;
         abs |$p:ident| $abs:expr;
         signum |$s:ident| $signum:expr;
         greater |$a:ident, $b:ident| $greater:expr;
@@ -181,6 +192,11 @@ macro_rules! register {
                 unsafe { $name($sqrt(self.0)) }
             }
             #[inline(always)]
+            fn mul_add(self, a: Self, b: Self) -> Self {
+                let ($m, $by, $plus) = (self.0, a.0, b.0);
+                unsafe { $name($mul_add) }
+            }
+            #[inline(always)]
             fn select(choose: $mask, a: Self, b: Self) -> Self {
                 let ($choose, $first, $second) = (choose, a.0, b.0);
                 unsafe { $name($select) }
@@ -209,8 +225,36 @@ macro_rules! register {
                 unsafe { $name($signum) }
             }
         }
+        /// Not inlined: angles are rare, and long.
+        impl crate::real::Trig for $name {
+            #[inline(always)]
+            fn sin_cos(self) -> (Self, Self) {
+                #[target_feature(enable = $features)]
+                fn called(x: $name) -> ($name, $name) {
+                    crate::trig::sin_cos(x)
+                }
+                unsafe { called(self) }
+            }
+            #[inline(always)]
+            fn acos(self) -> Self {
+                #[target_feature(enable = $features)]
+                fn called(x: $name) -> $name {
+                    crate::trig::acos(x)
+                }
+                unsafe { called(self) }
+            }
+            #[inline(always)]
+            fn atan2(self, x: Self) -> Self {
+                #[target_feature(enable = $features)]
+                fn called(y: $name, x: $name) -> $name {
+                    crate::trig::atan2(y, x)
+                }
+                unsafe { called(self, x) }
+            }
+        }
         impl Lanes for $name {
             const WIDTH: usize = $width;
+            const FUSED: bool = $fused;
             #[inline(always)]
             fn load(from: &[f64]) -> Self {
                 assert!(from.len() >= $width);
@@ -234,14 +278,15 @@ mod x86 {
     use std::mem::MaybeUninit;
     use std::sync::atomic::Ordering;
 
-    use super::{Lanes, Row, Task, WIDEST};
+    use super::{Lanes, Line, Task, WIDEST};
     use crate::real::Real;
 
     register! {
         /// SSE2, which every x86-64 has.
-        F64x2(__m128d), 2, __m128d;
+        F64x2(__m128d), 2, __m128d, "sse2", fused false;
         _mm_add_pd _mm_sub_pd _mm_mul_pd _mm_div_pd _mm_sqrt_pd _mm_set1_pd _mm_loadu_pd _mm_storeu_pd;
         neg |a| _mm_xor_pd(a, _mm_set1_pd(-0.0));
+        mul_add |a, b, c| _mm_add_pd(_mm_mul_pd(a, b), c);
         abs |a| _mm_andnot_pd(_mm_set1_pd(-0.0), a);
         signum |a| _mm_or_pd(_mm_and_pd(a, _mm_set1_pd(-0.0)), _mm_set1_pd(1.0));
         greater |a, b| _mm_cmpgt_pd(a, b);
@@ -251,9 +296,10 @@ mod x86 {
 
     register! {
         /// AVX2.
-        F64x4(__m256d), 4, __m256d;
+        F64x4(__m256d), 4, __m256d, "avx2,fma", fused true;
         _mm256_add_pd _mm256_sub_pd _mm256_mul_pd _mm256_div_pd _mm256_sqrt_pd _mm256_set1_pd _mm256_loadu_pd _mm256_storeu_pd;
         neg |a| _mm256_xor_pd(a, _mm256_set1_pd(-0.0));
+        mul_add |a, b, c| _mm256_fmadd_pd(a, b, c);
         abs |a| _mm256_andnot_pd(_mm256_set1_pd(-0.0), a);
         signum |a| _mm256_or_pd(_mm256_and_pd(a, _mm256_set1_pd(-0.0)), _mm256_set1_pd(1.0));
         greater |a, b| _mm256_cmp_pd::<_CMP_GT_OQ>(a, b);
@@ -263,9 +309,10 @@ mod x86 {
 
     register! {
         /// AVX-512.
-        F64x8(__m512d), 8, __mmask8;
+        F64x8(__m512d), 8, __mmask8, "avx512f,avx512dq,fma", fused true;
         _mm512_add_pd _mm512_sub_pd _mm512_mul_pd _mm512_div_pd _mm512_sqrt_pd _mm512_set1_pd _mm512_loadu_pd _mm512_storeu_pd;
         neg |a| _mm512_xor_pd(a, _mm512_set1_pd(-0.0));
+        mul_add |a, b, c| _mm512_fmadd_pd(a, b, c);
         abs |a| _mm512_abs_pd(a);
         signum |a| _mm512_or_pd(_mm512_and_pd(a, _mm512_set1_pd(-0.0)), _mm512_set1_pd(1.0));
         greater |a, b| _mm512_cmp_pd_mask::<_CMP_GT_OQ>(a, b);
@@ -292,13 +339,14 @@ mod x86 {
         }
 
         #[inline(always)]
-        fn scatter(rows: &[Row], states: &mut [MaybeUninit<f64>]) {
+        fn scatter(rows: &[Line], states: &mut [MaybeUninit<f64>]) {
             let count = rows.len();
             assert!(states.len() >= 8 * count);
             for start in (0..count).step_by(8) {
                 let mut tile = [Self::lit(0.0).0; 8];
-                for k in start..count.min(start + 8) {
-                    tile[k - start] = Self::load(&rows[k]).0;
+                for k in 0..8 {
+                    // The last row again beyond it: no branch, and never stored.
+                    tile[k] = Self::load(&rows[(start + k).min(count - 1)].0).0;
                 }
                 let (tile, mask) = (transposed(tile), first(count - start));
                 for lane in 0..8 {
@@ -372,7 +420,7 @@ mod x86 {
     pub fn widest() -> usize {
         if is_x86_feature_detected!("avx512f") && is_x86_feature_detected!("avx512dq") {
             8
-        } else if is_x86_feature_detected!("avx2") {
+        } else if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
             4
         } else {
             2
@@ -385,18 +433,18 @@ mod x86 {
 
         pub fn on_each_width(task: impl Task + Copy) {
             task.run::<F64x2>();
-            if is_x86_feature_detected!("avx2") {
+            if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
                 unsafe { avx2(task) }
             }
         }
     }
 
-    #[target_feature(enable = "avx512f,avx512dq")]
+    #[target_feature(enable = "avx512f,avx512dq,fma")]
     fn avx512(task: impl Task) {
         task.run::<F64x8>();
     }
 
-    #[target_feature(enable = "avx2")]
+    #[target_feature(enable = "avx2,fma")]
     fn avx2(task: impl Task) {
         task.run::<F64x4>();
     }
@@ -413,9 +461,10 @@ mod arm {
 
     register! {
         /// NEON, which every aarch64 has.
-        F64x2(float64x2_t), 2, uint64x2_t;
+        F64x2(float64x2_t), 2, uint64x2_t, "neon", fused true;
         vaddq_f64 vsubq_f64 vmulq_f64 vdivq_f64 vsqrtq_f64 vdupq_n_f64 vld1q_f64 vst1q_f64;
         neg |a| vnegq_f64(a);
+        mul_add |a, b, c| vfmaq_f64(c, a, b);
         abs |a| vabsq_f64(a);
         signum |a| vbslq_f64(vdupq_n_u64(1 << 63), a, vdupq_n_f64(1.0));
         greater |a, b| vcgtq_f64(a, b);
@@ -438,11 +487,14 @@ pub mod tests {
         x86::tests::on_each_width(task);
     }
 
+    /// Whether the register fuses, and the rows that operations give.
+    type Found = (bool, [[f64; 8]; 14]);
+
     /// Every operation, on pairs of numbers.
     #[derive(Clone, Copy)]
     struct Operations<'a> {
         pairs: &'a [[f64; 8]; 2],
-        results: &'a RefCell<Vec<[[f64; 8]; 14]>>,
+        results: &'a RefCell<Vec<Found>>,
     }
 
     impl Task for Operations<'_> {
@@ -473,7 +525,7 @@ pub mod tests {
                     number.store(&mut row[k..]);
                 }
             }
-            self.results.borrow_mut().push(results);
+            self.results.borrow_mut().push((V::FUSED, results));
         }
     }
 
@@ -484,7 +536,14 @@ pub mod tests {
         let b = [0.3, -2.5, -0.0, 0.0, 1e300, -inf, 1.0, nan];
         let results = RefCell::new(Vec::new());
         on_each_width(Operations { pairs: &[a, b], results: &results });
-        let all = results.into_inner();
+        let (fused, mut all): (Vec<bool>, Vec<_>) = results.into_inner().into_iter().unzip();
+        for (fused, results) in fused.into_iter().zip(&mut all) {
+            for k in 0..8 {
+                let sum = if fused { a[k].mul_add(b[k], a[k]) } else { a[k] * b[k] + a[k] };
+                let found = std::mem::replace(&mut results[11][k], 0.0);
+                assert!(found.to_bits() == sum.to_bits() || (found.is_nan() && sum.is_nan()), "{a:?} {b:?}");
+            }
+        }
         // Which NaN an invalid operation gives is left open, and with it the sign of a NaN.
         let bits = |row: [f64; 8]| row.map(|x| if x.is_nan() { 0 } else { x.to_bits() });
         let defined = |k: usize, x: u64| if k == 6 { 0 } else { x };
@@ -512,16 +571,16 @@ pub mod tests {
         #[inline(always)]
         fn run<V: Lanes>(self) {
             let Turned(states, found) = self;
-            let mut rows = [[0.0; WIDTH]; N];
+            let mut rows = [Line([0.0; WIDTH]); N];
             for lane in (0..WIDTH).step_by(V::WIDTH) {
                 let numbers = V::gather::<N>(&states[lane * N..]);
                 for k in 0..N {
-                    numbers[k].store(&mut rows[k][lane..]);
+                    numbers[k].store(&mut rows[k].0[lane..]);
                 }
             }
             let mut back = vec![MaybeUninit::new(0.0); states.len()];
             V::scatter(&rows, &mut back);
-            found.push(rows.concat());
+            found.push(rows.iter().flat_map(|row| row.0).collect());
             // SAFETY: made of numbers.
             found.push(back.iter().map(|x| unsafe { x.assume_init() }).collect());
         }

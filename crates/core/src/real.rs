@@ -66,7 +66,7 @@ pub trait Real:
 }
 
 /// Numbers in an order: one, or one in each lane.
-pub trait Ordered: Real<Value = Self> {
+pub trait Ordered: Real<Value = Self> + Trig {
     /// Yes or no, for each lane.
     type Mask: Copy;
 
@@ -198,7 +198,7 @@ impl Ordered for f64 {
     }
 }
 
-impl<T: Ordered> Trig for T {
+impl Trig for f64 {
     #[inline(always)]
     fn sin_cos(self) -> (Self, Self) {
         trig::sin_cos(self)

@@ -329,7 +329,21 @@ impl<T: Real> Mul<Vec3<T>> for Mat3<T> {
     type Output = Vec3<T>;
     #[inline(always)]
     fn mul(self, a: Vec3<T>) -> Vec3<T> {
-        self.0[0] * a.x + self.0[1] * a.y + self.0[2] * a.z
+        let [x, y, z] = self.0;
+        Vec3::new(
+            x.x.mul_add(a.x, y.x.mul_add(a.y, z.x * a.z)),
+            x.y.mul_add(a.x, y.y.mul_add(a.y, z.y * a.z)),
+            x.z.mul_add(a.x, y.z.mul_add(a.y, z.z * a.z)),
+        )
+    }
+}
+
+impl<T: Real> Add for Mat3<T> {
+    type Output = Self;
+    #[inline(always)]
+    fn add(self, b: Self) -> Self {
+        let ([a, b, c], [x, y, z]) = (self.0, b.0);
+        Mat3([a + x, b + y, c + z])
     }
 }
 

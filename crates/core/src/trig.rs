@@ -1,6 +1,6 @@
 //! Sine, cosine, arc cosine and the angle of a point, from the operations of [`Ordered`] alone.
 //!
-//! One source for single numbers and for lanes: no branch, no table, no fused operation, so that an angle is the same
+//! One source for single numbers and for lanes: no branch, no table, and nothing that could be fused, so that an angle is the same
 //! bits on every width and every platform. The polynomials are minimax fits of the relative error (Remez), with the
 //! coefficients rounded to doubles from the lowest power on; the error of each fit is given with it.
 

@@ -28,6 +28,11 @@ use pyo3::exceptions::{PyKeyError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
+/// Keeps memory for the next results: the system's allocator gives that of large arrays back, and fetching it page by page
+/// costs more than filling it.
+#[global_allocator]
+static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
+
 pyo3::create_exception!(
     _core,
     Faults,

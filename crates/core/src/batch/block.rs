@@ -9,7 +9,7 @@ use std::ops::Range;
 use rayon::prelude::*;
 
 use super::{Field, FieldId, Table};
-use crate::lanes::{self, Lanes, Row, Task, WIDTH};
+use crate::lanes::{self, Lanes, Line, Task, WIDTH};
 use crate::status::Status;
 use crate::threads;
 
@@ -146,7 +146,7 @@ impl At {
 
 /// Room for what a block of states answers.
 pub(super) struct Answers<'a, const N: usize> {
-    rows: &'a mut [Row],
+    rows: &'a mut [Line],
     /// The first row of each field.
     starts: &'a [usize; N],
     lane: usize,
@@ -164,7 +164,7 @@ impl<const N: usize> Answers<'_, N> {
         let start = self.starts[field.0] + part * M;
         let rows = &mut self.rows[start..start + M];
         for k in 0..M {
-            values[k].store(&mut rows[k][self.lane..]);
+            values[k].store(&mut rows[k].0[self.lane..]);
         }
     }
 }
@@ -352,7 +352,7 @@ impl<O: Operation<N>, const N: usize> Task for Blocks<'_, O, N> {
             count += width;
             count - width
         });
-        let mut rows = vec![[0.0; WIDTH]; count];
+        let mut rows = vec![Line([0.0; WIDTH]); count];
         for block in 0..part.status.len().div_ceil(WIDTH) {
             let first = block * WIDTH;
             let status = &mut part.status[first..];
@@ -378,7 +378,7 @@ impl<O: Operation<N>, const N: usize> Task for Blocks<'_, O, N> {
 
 /// From rows, states side by side, to states one after the other; NaN for those without an answer.
 #[inline(always)]
-fn copy<V: Lanes>(rows: &[Row], answered: &[bool], to: &mut [MaybeUninit<f64>]) {
+fn copy<V: Lanes>(rows: &[Line], answered: &[bool], to: &mut [MaybeUninit<f64>]) {
     if *answered == [true; WIDTH] {
         return V::scatter(rows, to);
     }
@@ -386,7 +386,7 @@ fn copy<V: Lanes>(rows: &[Row], answered: &[bool], to: &mut [MaybeUninit<f64>]) 
     {
         if *answered {
             for (place, row) in places.iter_mut().zip(rows) {
-                place.write(row[lane]);
+                place.write(row.0[lane]);
             }
         } else {
             for place in places {

@@ -7,7 +7,7 @@ use crate::lanes::Lanes;
 use crate::leg;
 use crate::limits::{Limit, Seen};
 use crate::mechanism::{Constraint, Mechanism, Turning};
-use crate::real::{Ordered, Real, Trig};
+use crate::real::{Ordered, Real};
 use crate::spatial::{Mat3, Motion, Pose, Twist, Vec3};
 use crate::status::Status;
 
@@ -180,11 +180,7 @@ pub(super) fn check_finite(values: &[f64]) -> Status {
 
 /// The first limit of a joint that a pose breaks.
 #[inline(always)]
-pub(super) fn within_limits<V: Lanes + Trig>(
-    mech: &Mechanism,
-    pose: &Pose<V>,
-    mut codes: Codes<V>,
-) -> Codes<V> {
+pub(super) fn within_limits<V: Lanes>(mech: &Mechanism, pose: &Pose<V>, mut codes: Codes<V>) -> Codes<V> {
     let mut seen = Seen::default();
     for limit in joint_limits(mech) {
         let margin = limit.bound.margin(limit.of_joint(mech, pose, &mut seen));

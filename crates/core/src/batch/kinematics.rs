@@ -164,8 +164,8 @@ impl Operation<21> for Kinematics<'_> {
             answers.put(rates, k, [end.rate]);
             answers.put(accelerations, k, [end.acceleration]);
             answers.put(directions, k, p.delta.array());
-            answers.put(leg_omega, k, turn.omega.array());
-            answers.put(leg_eps, k, turn.eps.array());
+            answers.put(leg_omega, k, state.omega().array());
+            answers.put(leg_eps, k, state.eps().array());
             answers.put(leg_spin, k, [turn.spin]);
             answers.put(leg_spin_rate, k, [turn.spin_rate]);
             answers.put(piston_velocity, k, piston.velocity.array());
