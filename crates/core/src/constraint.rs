@@ -227,6 +227,7 @@ pub fn hessian<T: Real>(constraint: &Constraint<impl Constant<T>>, pose: &Pose<T
 
 /// What makes a constraint's value a pure number.
 #[must_use]
+#[inline(always)]
 pub fn unit<S>(c: &Constraint<S>, scale: f64) -> f64 {
     if c.kind == ConstraintKind::D { 1.0 } else { scale }
 }

@@ -5,7 +5,8 @@
 //! place with trigonometry.
 
 use crate::constraint;
-use crate::linear::{Solved, solve};
+use crate::lanes::{Lanes, WIDTH};
+use crate::linear::solve;
 use crate::mechanism::{Constraint, ConstraintKind, MAX_CONSTRAINTS, Mechanism};
 use crate::mobility::count;
 use crate::real::{Constant, Dual, Jet, Mask, Ordered, Real, Scalar, Trig};
@@ -373,9 +374,16 @@ pub fn state(
     let finite =
         q.iter().zip(given).all(|(c, g)| !g || (c.x.is_finite() && c.d.is_finite() && c.dd.is_finite()));
     let failing = if finite { first(complete(mech, set, &mut q, branch)) } else { Status::InvalidInput };
+    let dependent = Dependent::of(set, given);
     let (status, branch) = match (set, failing) {
         (Set::Paper(_), status) => (status, if finite { branch } else { f64::NAN }),
-        (_, Status::Ok) => solve_dependent(mech, set, &mut q, given, guess),
+        (_, Status::Ok) if dependent.count == 0 => (Status::Ok, 1.0),
+        (_, Status::Ok) => {
+            let start = set.values(mech, guess);
+            let (conditions, sign) = solve_dependent(mech, set, &mut q, &dependent, &start, true);
+            let status = first(conditions);
+            (status, if status == Status::Ok { sign } else { f64::NAN })
+        }
         (_, status) => (status, f64::NAN),
     };
     State { coordinates: q, platform: motion(&set.pose(mech, &q)), branch, status }
@@ -442,13 +450,13 @@ where
     S: Constant<Jet<Dual<f64>>> + Constant<Dual<Dual<f64>>>,
 {
     let mut q = *q;
-    let dependent: Vec<usize> = (0..set.names().len()).filter(|&i| !given[i]).collect();
-    if dependent.is_empty() {
+    let dependent = Dependent::of(set, given);
+    if dependent.count == 0 {
         return (motion(&set.pose(mech, &q)), 1.0);
     }
-    let residual = constraint_parts(mech, &set.pose(mech, &q), |g| -g.x);
+    let residual = residual(mech, &set.pose(mech, &q)).map(|g| -g.x);
     let step = solve(gradient(mech, set, &q, &dependent), residual).x;
-    for (&i, s) in dependent.iter().zip(step) {
+    for (&i, s) in dependent.numbers().iter().zip(step) {
         // The values are a solution within rounding: only their derivatives move.
         q[i] = Jet::new(q[i].x + Dual::new(0.0, s.d), Dual::zero(), Dual::zero());
     }
@@ -493,112 +501,179 @@ fn branch_of_gamma<V: Ordered>(plane: &Plane, q: &mut Values<Jet<V>>, branch: f6
 
 type System<T> = [T; MAX_CONSTRAINTS];
 
-/// Newton on the independent constraints for the coordinates that are not given, then their rates and second rates
-/// from the same matrix: `G_y y' = -ġ(y' = 0)`, `G_y y'' = -g̈(y'' = 0)` \[T23\]. Returns the sign of det G_y too: it
-/// tells apart the solutions that meet in a fold.
-fn solve_dependent(
+/// The numbers of a set that are not given.
+#[derive(Clone, Copy, Debug)]
+pub struct Dependent {
+    indices: [usize; MAX_COORDINATES],
+    pub count: usize,
+}
+
+impl Dependent {
+    #[must_use]
+    pub fn of<S: Scalar>(set: &Set<S>, given: &[bool]) -> Self {
+        let mut dependent = Dependent { indices: [0; MAX_COORDINATES], count: 0 };
+        for i in (0..set.names().len()).filter(|&i| !given[i]) {
+            dependent.indices[dependent.count] = i;
+            dependent.count += 1;
+        }
+        dependent
+    }
+
+    #[inline(always)]
+    fn numbers(&self) -> &[usize] {
+        &self.indices[..self.count]
+    }
+}
+
+/// Newton on the independent constraints for the coordinates that are not given, from those of `start`, then their rates
+/// and second rates from the same matrix: `G_y y' = -ġ(y' = 0)`, `G_y y'' = -g̈(y'' = 0)` \[T23\]. Only where they are
+/// `wanted`; every lane goes its own way to its own end. Returns the sign of det G_y too: it tells apart the solutions
+/// that meet in a fold.
+#[inline(always)]
+pub fn solve_dependent<V: Lanes>(
     mech: &Mechanism,
     set: &Set,
-    q: &mut Values<Jet<f64>>,
-    given: &[bool],
-    guess: &Pose<f64>,
-) -> (Status, f64) {
-    let dependent: Vec<usize> = (0..set.names().len()).filter(|&i| !given[i]).collect();
-    if dependent.is_empty() {
-        return (Status::Ok, 1.0);
-    }
-    let start = set.values(mech, guess);
-    for &i in &dependent {
+    q: &mut Values<Jet<V>>,
+    dependent: &Dependent,
+    start: &Values<f64>,
+    wanted: Mask<V>,
+) -> (Conditions<V>, V) {
+    let (zero, one, nan) = (V::zero(), V::one(), V::lit(f64::NAN));
+    let (numbers, scale, unsolved) = (dependent.numbers(), mech.characteristic_length, *q);
+    for &i in numbers {
         q[i] = Jet::lit(start[i]);
     }
-    let scale = mech.characteristic_length;
-    let residual = |q: &Values<Jet<f64>>| constraint_parts(mech, &set.pose(mech, &q.map(|c| c.x)), |g| g);
-    let size =
-        |g: &System<f64>| g.iter().fold(0.0_f64, |m, e| if e.abs() > m || e.is_nan() { e.abs() } else { m });
-
-    let mut g = residual(q);
-    let mut converged = false;
+    let mut g = residual(mech, &set.pose(mech, &values(q)));
+    // One in lanes that are still under way, and in those that have arrived.
+    let (mut active, mut converged) = (V::select(wanted, one, zero), zero);
     for _ in 0..NEWTON_STEPS {
-        let step = solve(gradient(mech, set, q, &dependent), g.map(|e| -e)).x;
-        // No coordinate moves by more than half a radian or half the characteristic length at once.
-        let largest =
-            dependent.iter().zip(&step).map(|(&i, s)| s.abs() / reach(set, i, scale)).fold(0.0, f64::max);
-        if !size(&step).is_finite() {
-            // The coordinates do not determine the others; the guess may still be a solution.
-            converged = size(&g) <= SOLVED;
-            break;
+        let mut rhs = g;
+        for e in &mut rhs {
+            *e = -*e;
         }
-        let mut share = (0.5 / largest).min(1.0);
-        let from = *q;
+        let step = solve(gradient(mech, set, q, dependent), rhs).x;
+        // No coordinate moves by more than half a radian or half the characteristic length at once.
+        let mut largest = zero;
+        for (k, &i) in numbers.iter().enumerate() {
+            largest = largest.most(step[k].abs().scale(1.0 / reach(set, i, scale)));
+        }
+        // Else the coordinates do not determine the others; the guess may still be a solution.
+        let finite = (size(&step) * zero).at_most(zero);
+        let solved = V::select(size(&g).at_most(V::lit(SOLVED)), active, zero);
+        converged = V::select(finite, converged, converged.most(solved));
+        active = V::select(finite, active, zero);
+
+        let (from, before) = (*q, size(&g));
+        let (mut share, mut searching) = ((V::lit(0.5) / largest).least(one), active);
         for _ in 0..8 {
-            for (&i, s) in dependent.iter().zip(&step) {
-                q[i].x = from[i].x + share * s;
+            let moving = searching.greater(zero);
+            for (k, &i) in numbers.iter().enumerate() {
+                q[i].x = V::select(moving, from[i].x + share * step[k], q[i].x);
             }
-            g = residual(q);
-            if size(&g) <= size(&residual(&from)) {
+            let tried = residual(mech, &set.pose(mech, &values(q)));
+            for k in 0..MAX_CONSTRAINTS {
+                g[k] = V::select(moving, tried[k], g[k]);
+            }
+            searching = V::select(size(&g).at_most(before), zero, searching);
+            if !any(searching) {
                 break;
             }
-            share *= 0.5;
+            share = share.scale(0.5);
         }
-        if largest <= 1e-13 || size(&g) == 0.0 {
-            converged = true;
+        let exact = V::select(size(&g).at_most(zero), one, zero);
+        let near = V::select(largest.at_most(V::lit(1e-10)), one, exact);
+        let there = V::select(largest.at_most(V::lit(1e-13)), one, exact);
+        let under_way = active.greater(zero);
+        converged = V::select(under_way, near, converged);
+        active = V::select(there.greater(zero), zero, active);
+        if !any(active) {
             break;
         }
-        converged = largest <= 1e-10;
     }
-    if !converged {
-        for &i in &dependent {
-            q[i] = Jet::new(f64::NAN, f64::NAN, f64::NAN);
-        }
-        return (Status::NotConverged, f64::NAN);
+    let (pivots, sign) = follow(mech, set, q, dependent);
+    let (arrived, regular) = (converged.greater(zero), pivots.greater(V::lit(DEPENDENT_PIVOTS)));
+    for &i in numbers {
+        let Jet { x, d, dd } = q[i];
+        let rates = [V::select(regular, d, nan), V::select(regular, dd, nan)];
+        let found = Jet::select(arrived, Jet::new(x, rates[0], rates[1]), Jet::new(nan, nan, nan));
+        q[i] = Jet::select(wanted, found, unsolved[i]);
     }
-    let (pivots, sign) = follow(mech, set, q, &dependent);
-    if !(pivots > DEPENDENT_PIVOTS) {
-        for &i in &dependent {
-            q[i] = Jet::new(q[i].x, f64::NAN, f64::NAN);
-        }
-        return (Status::Fold, f64::NAN);
+    ([(arrived, Status::NotConverged), (regular, Status::Fold)], sign)
+}
+
+/// Whether it is more than zero in any lane.
+#[inline(always)]
+fn any<V: Lanes>(x: V) -> bool {
+    let (mut row, mut sum) = ([0.0; WIDTH], 0.0);
+    x.store(&mut row);
+    for x in row {
+        sum += x;
     }
-    (Status::Ok, sign)
+    sum > 0.0
+}
+
+/// The largest entry's size; NaN if one is.
+#[inline(always)]
+fn size<V: Ordered>(g: &System<V>) -> V {
+    let mut size = V::zero();
+    for e in g {
+        size = V::select(e.at_most(*e), size.most(e.abs()), *e);
+    }
+    size
+}
+
+/// The numbers without their rates.
+#[inline(always)]
+fn values<T: Real>(q: &Values<Jet<T>>) -> Values<T> {
+    let mut values = [T::zero(); MAX_COORDINATES];
+    for k in 0..MAX_COORDINATES {
+        values[k] = q[k].x;
+    }
+    values
 }
 
 /// Rates and second rates of the dependent coordinates at known values, from one matrix: `G_y y' = -ġ(y' = 0)`,
 /// `G_y y'' = -g̈(y'' = 0)` \[T23\]. They must be zero before. With the pivot ratio and the sign of det G_y.
+#[inline(always)]
 fn follow<T: Trig, S>(
     mech: &Mechanism<S>,
     set: &Set<S>,
     q: &mut Values<Jet<T>>,
-    dependent: &[usize],
+    dependent: &Dependent,
 ) -> (T::Value, T::Value)
 where
     S: Constant<Jet<T>> + Constant<Dual<T>>,
 {
     let matrix = gradient(mech, set, q, dependent);
-    let rates = |q: &Values<Jet<T>>, part: fn(Jet<T>) -> T| -> Solved<T, System<T>> {
-        solve(matrix, constraint_parts(mech, &set.pose(mech, q), part))
-    };
-    let first = rates(q, |g| -g.d);
-    for (&i, d) in dependent.iter().zip(&first.x) {
-        q[i].d = *d;
+    let mut rhs = [T::zero(); MAX_CONSTRAINTS];
+    let g = residual(mech, &set.pose(mech, q));
+    for k in 0..MAX_CONSTRAINTS {
+        rhs[k] = -g[k].d;
     }
-    let second = rates(q, |g| -g.dd);
-    for (&i, dd) in dependent.iter().zip(&second.x) {
-        q[i].dd = *dd;
+    let first = solve(matrix, rhs);
+    for (k, &i) in dependent.numbers().iter().enumerate() {
+        q[i].d = first.x[k];
+    }
+    let g = residual(mech, &set.pose(mech, q));
+    for k in 0..MAX_CONSTRAINTS {
+        rhs[k] = -g[k].dd;
+    }
+    let second = solve(matrix, rhs);
+    for (k, &i) in dependent.numbers().iter().enumerate() {
+        q[i].dd = second.x[k];
     }
     (first.pivots, first.sign)
 }
 
-/// What `part` takes of the values of the independent constraints in pure numbers; zero beyond their number.
-fn constraint_parts<N: Real, T: Real>(
-    mech: &Mechanism<impl Constant<N>>,
-    pose: &Pose<N>,
-    part: fn(N) -> T,
-) -> System<T> {
-    std::array::from_fn(|k| {
-        mech.independent.get(k).map_or_else(T::zero, |c| {
-            part(constraint::value(c, pose)) / T::lit(constraint::unit(c, mech.characteristic_length))
-        })
-    })
+/// The values of the independent constraints in pure numbers; zero beyond their number.
+#[inline(always)]
+fn residual<N: Real>(mech: &Mechanism<impl Constant<N>>, pose: &Pose<N>) -> System<N> {
+    let mut values = [N::zero(); MAX_CONSTRAINTS];
+    for k in 0..mech.independent.len() {
+        let c = &mech.independent[k];
+        values[k] = constraint::value(c, pose).scale(1.0 / constraint::unit(c, mech.characteristic_length));
+    }
+    values
 }
 
 /// Which numbers of the set to give so that the constraints determine the others best at the home pose.
@@ -611,16 +686,18 @@ pub fn best_given(mech: &Mechanism, set: &Set) -> Vec<bool> {
     let home = set.values(mech, &mech.home).map(Jet::lit);
     let mut best = (-1.0, vec![true; count]);
     for mask in (0..1_usize << count).filter(|mask| mask.count_ones() as usize == wanted) {
-        let dependent: Vec<usize> = (0..count).filter(|i| mask >> i & 1 == 1).collect();
+        let given: Vec<bool> = (0..count).map(|i| mask >> i & 1 == 0).collect();
+        let dependent = Dependent::of(set, &given);
         let pivots = solve(gradient(mech, set, &home, &dependent), [0.0; MAX_CONSTRAINTS]).pivots;
         if pivots > best.0 {
-            best = (pivots, (0..count).map(|i| mask >> i & 1 == 0).collect());
+            best = (pivots, given);
         }
     }
     best.1
 }
 
 /// What one unit of a dependent coordinate's step is measured by: a length or a radian.
+#[inline(always)]
 fn reach(set: &Set, index: usize, scale: f64) -> f64 {
     match set {
         Set::Pose if index < 3 => scale,
@@ -629,20 +706,26 @@ fn reach(set: &Set, index: usize, scale: f64) -> f64 {
 }
 
 /// ∂g/∂y by duals, unused rows and columns those of the identity.
+#[inline(always)]
 fn gradient<T: Trig, S: Constant<Dual<T>>>(
     mech: &Mechanism<S>,
     set: &Set<S>,
     q: &Values<Jet<T>>,
-    dependent: &[usize],
+    dependent: &Dependent,
 ) -> [System<T>; MAX_CONSTRAINTS] {
-    let mut matrix: [System<T>; MAX_CONSTRAINTS] =
-        std::array::from_fn(|i| std::array::from_fn(|j| if i == j { T::one() } else { T::zero() }));
-    for (column, &i) in dependent.iter().enumerate() {
-        let mut seeded = q.map(|c| Dual::new(c.x, T::zero()));
+    let mut matrix = [[T::zero(); MAX_CONSTRAINTS]; MAX_CONSTRAINTS];
+    for k in 0..MAX_CONSTRAINTS {
+        matrix[k][k] = T::one();
+    }
+    for (column, &i) in dependent.numbers().iter().enumerate() {
+        let mut seeded = [Dual::lit(0.0); MAX_COORDINATES];
+        for k in 0..MAX_COORDINATES {
+            seeded[k].x = q[k].x;
+        }
         seeded[i].d = T::one();
-        let derivatives = constraint_parts(mech, &set.pose(mech, &seeded), |g| g.d);
+        let derivatives = residual(mech, &set.pose(mech, &seeded));
         for row in 0..mech.independent.len() {
-            matrix[row][column] = derivatives[row];
+            matrix[row][column] = derivatives[row].d;
         }
     }
     matrix

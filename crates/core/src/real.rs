@@ -451,8 +451,7 @@ impl<T: Real> Real for Jet<T> {
     }
     #[inline(always)]
     fn select(choose: Mask<T>, a: Self, b: Self) -> Self {
-        let of = |a: T, b: T| T::select(choose, a, b);
-        Jet::new(of(a.x, b.x), of(a.d, b.d), of(a.dd, b.dd))
+        Jet::new(T::select(choose, a.x, b.x), T::select(choose, a.d, b.d), T::select(choose, a.dd, b.dd))
     }
 }
 

@@ -5,7 +5,7 @@ use super::block::{self, Answers, At, Codes, Operation, Pieces};
 use super::checks::{
     check_legs, check_motion, finite, is_rotation, raw_pose, read_pose, then, with_legs, with_motion,
 };
-use crate::coordinates::{self, MAX_COORDINATES, Set, State, Values};
+use crate::coordinates::{self, Dependent, MAX_COORDINATES, Set, State, Values};
 use crate::lanes::Lanes;
 use crate::mechanism::Mechanism;
 use crate::real::{Jet, Real};
@@ -40,12 +40,10 @@ pub fn states(mech: &Mechanism, input: &Coordinates, n: usize) -> Table {
     let mask: Vec<bool> =
         (0..MAX_COORDINATES).map(|k| k >= names.len() || input.given[k].is_some()).collect();
     let all_given = mask.iter().all(|&given| given) && !mech.independent.is_empty();
-    let solved = match input.set {
-        Set::Paper(_) => false,
-        _ => mask.contains(&false),
-    };
-    if !solved && !input.continued && input.guess.is_none() {
-        return block::table(&Closed { mech, input, all_given }, n, fields);
+    if !input.continued && input.guess.is_none() {
+        let dependent = Dependent::of(&input.set, &mask);
+        let start = input.set.values(mech, &mech.home);
+        return block::table(&FromCoordinates { mech, input, dependent, start, all_given }, n, fields);
     }
     let pieces = if input.continued { Pieces::WHOLE } else { Pieces::QUICK };
     block::in_pieces(n, fields, pieces, |rows, states| {
@@ -96,15 +94,18 @@ pub fn states(mech: &Mechanism, input: &Coordinates, n: usize) -> Table {
     })
 }
 
-/// States whose coordinates are all given or follow in closed form.
-struct Closed<'a> {
+/// States that do not depend on one another, all from home.
+struct FromCoordinates<'a> {
     mech: &'a Mechanism,
     input: &'a Coordinates<'a>,
+    dependent: Dependent,
+    /// The numbers of home.
+    start: Values<f64>,
     /// Whether constraints are left to be kept by the given coordinates.
     all_given: bool,
 }
 
-impl Operation<6> for Closed<'_> {
+impl Operation<6> for FromCoordinates<'_> {
     #[inline(always)]
     fn run<V: Lanes>(&self, at: At, answers: &mut Answers<'_, 6>) -> Codes<V> {
         let (mech, input) = (self.mech, self.input);
@@ -119,6 +120,12 @@ impl Operation<6> for Closed<'_> {
         }
         let [pose, regular] = coordinates::complete(mech, &input.set, &mut q, input.branch);
         codes = codes.unless(pose.0, pose.1).unless(regular.0, regular.1);
+        if self.dependent.count > 0 && !matches!(input.set, Set::Paper(_)) {
+            let wanted = codes.are(Status::Ok);
+            let ([found, regular], _) =
+                coordinates::solve_dependent(mech, &input.set, &mut q, &self.dependent, &self.start, wanted);
+            codes = codes.unless(found.0, found.1).unless(regular.0, regular.1);
+        }
         let platform = coordinates::motion(&input.set.pose(mech, &q));
         codes = with_legs(mech, &platform.pose, codes);
         if self.all_given {
