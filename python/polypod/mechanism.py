@@ -645,7 +645,7 @@ class Mechanism:
             branch: as for `state`; slices only.
             keep_aspect: only what is reached without a change of the sign of det J.
             sigma_min: a floor for the smallest singular value: the dexterous workspace.
-            threads: 0 for all cores; reachable workspace only. The result does not depend on it.
+            threads: 0 for those of `set_threads`; reachable workspace only. No result depends on it.
             progress: called with the number of nodes done and of all.
 
         Raises:
@@ -702,7 +702,7 @@ class Mechanism:
                 base where home is.
             start: pose (4, 4) whose aspect is meant; by default a well conditioned one found from home.
             sigma_min: a floor for the smallest singular value.
-            threads: 0 for all cores. The result does not depend on it.
+            threads: 0 for those of `set_threads`. The result does not depend on it.
             progress: called with the number of nodes reached and of all.
 
         Raises:
