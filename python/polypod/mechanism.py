@@ -1236,6 +1236,8 @@ def _shaped(table: Mapping[str, NDArray[Any]], shape: tuple[int, ...]) -> dict[s
     """The core's arrays with the batch's own leading axes."""
     if len(shape) == 1:
         return dict(table)
+    if not shape:
+        return {name: array[0, ...] for name, array in table.items()}
     return {name: array.reshape(shape + array.shape[1:]) for name, array in table.items()}
 
 
