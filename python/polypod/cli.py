@@ -638,7 +638,7 @@ def workspace(
     sigma_min: Annotated[
         float | None, typer.Option(metavar="X", help="Floor for the smallest singular value.")
     ] = None,
-    threads: Annotated[int, typer.Option(metavar="N", help="Threads; 0 for all cores.")] = 0,
+    threads: Annotated[int, typer.Option(metavar="N", help="Threads; 0 for those of batches.")] = 0,
     output: Annotated[
         Path | None,
         typer.Option("-o", "--output", metavar="FILE", help="Save the boundary (.stl, .ply) or all (.nc)."),

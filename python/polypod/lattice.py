@@ -28,7 +28,7 @@ MOST_NODES = 10**9
 class LengthLattice:
     """Positions of o for all combinations of leg lengths in one aspect [T41].
 
-    Memory: 4 bytes for each node and 16 for each pose.
+    Memory: 5 bytes for each node, 16 for each pose, and 500 for each that a wave reaches.
     """
 
     step: float
@@ -44,7 +44,7 @@ class LengthLattice:
     singular: int
     """Steps to a neighbour that end in a singularity."""
     extents: Array
-    """(3, 2): least and greatest x, y, z of o, m: of these poses and where steps end on the way."""
+    """(3, 2): least and greatest x, y, z of o, m: of these poses and of those that steps pass in pieces."""
     layers: Array
     """(k, 2): lower and upper end of each layer of z, m; only layers that hold a position."""
     profile: Array

@@ -645,7 +645,7 @@ class Mechanism:
             branch: as for `state`; slices only.
             keep_aspect: only what is reached without a change of the sign of det J.
             sigma_min: a floor for the smallest singular value: the dexterous workspace.
-            threads: 0 for all cores; reachable workspace only. The result does not depend on it.
+            threads: 0 for those of `set_threads`; reachable workspace only. No result depends on it.
             progress: called with the number of nodes done and of all.
 
         Raises:
@@ -702,7 +702,7 @@ class Mechanism:
                 base where home is.
             start: pose (4, 4) whose aspect is meant; by default a well conditioned one found from home.
             sigma_min: a floor for the smallest singular value.
-            threads: 0 for all cores. The result does not depend on it.
+            threads: 0 for those of `set_threads`. The result does not depend on it.
             progress: called with the number of nodes reached and of all.
 
         Raises:
@@ -1163,11 +1163,17 @@ class Mechanism:
     @staticmethod
     def _batch(**arguments: tuple[ArrayLike, tuple[int, ...]]) -> tuple[tuple[int, ...], list[Array]]:
         """The common leading shape of arrays with the given trailing shapes, and the arrays spread to it."""
-        arrays = [_array(name, value, core) for name, (value, core) in arguments.items()]
-        cores = [core for _, core in arguments.values()]
-        shapes = [a.shape[: a.ndim - len(core)] for a, core in zip(arrays, cores, strict=True)]
+        arrays, shapes = [], []
+        for name, (value, core) in arguments.items():
+            array = _array(name, value, core)
+            arrays.append(array)
+            shapes.append(array.shape[: array.ndim - len(core)])
+        shape = shapes[0]
+        # Plain calls, those of a controller, do without numpy's slow broadcasting.
+        if shapes.count(shape) == len(shapes):
+            return shape, [np.ascontiguousarray(array) for array in arrays]
         shape = _broadcast(*shapes)
-        return shape, [_spread(a, shape, core) for a, core in zip(arrays, cores, strict=True)]
+        return shape, [_spread(a, shape, core) for a, (_, core) in zip(arrays, arguments.values(), strict=True)]
 
 
 def _plain(value: Any) -> Any:
@@ -1215,8 +1221,6 @@ def _array(name: str, value: ArrayLike, core: tuple[int, ...]) -> Array:
 
 
 def _broadcast(*shapes: tuple[int, ...]) -> tuple[int, ...]:
-    if all(shape == shapes[0] for shape in shapes):
-        return shapes[0]  # the plain case, without numpy's delay
     try:
         return np.broadcast_shapes(*shapes)
     except ValueError:
@@ -1224,9 +1228,8 @@ def _broadcast(*shapes: tuple[int, ...]) -> tuple[int, ...]:
 
 
 def _spread(array: Array, shape: tuple[int, ...], core: tuple[int, ...]) -> Array:
-    """Flat and contiguous, one row for each state."""
-    whole = shape + core
-    return np.ascontiguousarray(array if array.shape == whole else np.broadcast_to(array, whole)).reshape(-1)
+    """Contiguous, one row for each state."""
+    return np.ascontiguousarray(np.broadcast_to(array, shape + core))
 
 
 def _shaped(table: Mapping[str, NDArray[Any]], shape: tuple[int, ...]) -> dict[str, NDArray[Any]]:

@@ -201,7 +201,7 @@ def start_of(mech: Mechanism, start: ArrayLike | None, bounds: Array, *, regular
 def check_threads(threads: int) -> None:
     """Raises WorkspaceError for a number of threads that is none."""
     if threads < 0:
-        raise WorkspaceError(f"threads is {threads!r}; must be 0 (all cores) or more")
+        raise WorkspaceError(f"threads is {threads!r}; must be 0 (those of batches) or more")
 
 
 def find_start(mech: Mechanism, bounds: Array, *, regular: bool) -> Array:

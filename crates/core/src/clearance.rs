@@ -96,7 +96,7 @@ impl<T: Real> Line<T> {
 
     /// Squared distance of a point.
     #[inline(always)]
-    fn to_point(&self, p: Vec3<T>) -> T {
+    fn to_point(self, p: Vec3<T>) -> T {
         square(p - self.at(within((p - self.ends[0]).dot(self.vector) * self.inverse)))
     }
 }

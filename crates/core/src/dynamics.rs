@@ -1,7 +1,7 @@
 //! Inverse dynamics by virtual power: every link's weight and inertia is carried to the platform's twist by the
 //! transpose of its own Jacobian, then actuators and constraints balance the sum [Eq. 40-43] \[T13\]-\[T17\].
 
-use crate::jacobian::{Matrix6, scaled_jacobian};
+use crate::jacobian::{Matrix6, constraint_rows, scaled};
 use crate::leg;
 use crate::linear::solve;
 use crate::mechanism::{Body, Leg, Mechanism, Rod};
@@ -176,20 +176,54 @@ pub fn inverse_dynamics<T: Real>(
     platform: &Motion<T>,
     load: Wrench<T>,
 ) -> ([T; 6], T::Value) {
-    balancing(mech, &platform.pose, resultant(mech, platform, load))
+    let mut balance = Balance::new(mech, platform, load);
+    for (i, leg) in mech.legs.iter().enumerate() {
+        balance.add(mech, i, leg, &leg::place(leg, &platform.pose), platform);
+    }
+    balance.solved(mech, &platform.pose)
 }
 
-/// Active forces and multipliers that balance a wrench on the platform at o, with the pivot ratio of J \[T15\].
-#[inline(always)]
-pub fn balancing<T: Real>(
-    mech: &Mechanism<impl Constant<T>>,
-    pose: &Pose<T>,
-    w: Wrench<T>,
-) -> ([T; 6], T::Value) {
-    balanced(mech, transposed(&scaled_jacobian(mech, pose)), w)
+/// [Eq. 43] as it is set up, leg by leg: the braces, and the rows of J.
+#[derive(Clone, Copy, Debug)]
+pub struct Balance<T> {
+    wrench: Wrench<T>,
+    rows: Matrix6<T>,
+    count: usize,
 }
 
-/// The same with the transposed scaled Jacobian at hand.
+impl<T: Real> Balance<T> {
+    #[inline(always)]
+    pub fn new<S: Constant<T>>(mech: &Mechanism<S>, platform: &Motion<T>, load: Wrench<T>) -> Self {
+        Balance { wrench: own_wrench(mech, platform, load), rows: [[T::zero(); 6]; 6], count: 0 }
+    }
+
+    /// Adds the next leg, at its place.
+    #[inline(always)]
+    pub fn add<S: Constant<T>>(
+        &mut self,
+        mech: &Mechanism<S>,
+        index: usize,
+        leg: &Leg<S>,
+        place: &leg::Place<T>,
+        platform: &Motion<T>,
+    ) {
+        self.wrench = self.wrench + leg_wrench(mech, index, leg, place, platform);
+        if leg.actuated {
+            self.rows[self.count] = leg::row(&place.0).array();
+            self.count += 1;
+        }
+    }
+
+    /// The forces and multipliers, once all legs are there.
+    #[inline(always)]
+    pub fn solved<S: Constant<T>>(mut self, mech: &Mechanism<S>, pose: &Pose<T>) -> ([T; 6], T::Value) {
+        constraint_rows(mech, pose, &mut self.rows[self.count..]);
+        balanced(mech, transposed(&scaled(mech, self.rows)), self.wrench)
+    }
+}
+
+/// Active forces and multipliers that balance a wrench on the platform at o, with the pivot ratio of J \[T15\]. The
+/// columns are those of the transposed scaled Jacobian.
 #[inline(always)]
 pub(crate) fn balanced<T: Real>(
     mech: &Mechanism<impl Constant<T>>,

@@ -12,7 +12,7 @@ use crate::spatial::{Mat3, Pose, Vec3};
 use crate::status::Status;
 
 /// The columns of R and o of each.
-type Poses = [Row; 12];
+pub(crate) type Poses = [Row; 12];
 
 /// [`forward_kinematics`](crate::forward::forward_kinematics) of at most [`WIDTH`] states, each as if it were alone.
 ///
@@ -57,24 +57,72 @@ enum Stage {
     Left,
 }
 
+/// A piece of a path, or one in each lane, made in Newton steps.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Piece<V> {
+    steps: V,
+    /// Size of the last step.
+    last: V,
+    /// Sign of the determinant at its beginning.
+    sign: V,
+}
+
+/// What may have come of a piece, as numbers: it goes on, has arrived, or is left as too long, for it contracts too
+/// little or changes the sign of the determinant.
+pub(crate) const GOING: f64 = 0.0;
+pub(crate) const ARRIVED: f64 = 1.0;
+pub(crate) const LEFT: f64 = 2.0;
+
+/// Numbers of a piece in each lane.
+pub(crate) type Pieces = [Row; 3];
+
+/// Those of one that has not begun.
+pub(crate) const BEGINNING: [f64; 3] = [0.0, f64::INFINITY, 0.0];
+
+impl<V: Lanes> Piece<V> {
+    #[inline(always)]
+    pub(crate) fn load(pieces: &Pieces, k: usize) -> Self {
+        let [steps, last, sign] = pieces;
+        Piece { steps: V::load(&steps[k..]), last: V::load(&last[k..]), sign: V::load(&sign[k..]) }
+    }
+
+    #[inline(always)]
+    pub(crate) fn store(self, pieces: &mut Pieces, k: usize) {
+        let [steps, last, sign] = pieces;
+        self.steps.store(&mut steps[k..]);
+        self.last.store(&mut last[k..]);
+        self.sign.store(&mut sign[k..]);
+    }
+
+    /// What a Newton step, judged by its size and by the sign of the determinant before it, makes of the piece, and
+    /// where it is to be made; as [`continuation`](crate::forward::continuation) does.
+    #[inline(always)]
+    pub(crate) fn judge(&mut self, size: V, sign: V) -> (V, V::Mask) {
+        let (no, yes) = (V::zero(), V::one());
+        self.sign = V::select(self.steps.greater(no), self.sign, sign);
+        self.steps = self.steps + yes;
+        let same = V::select((sign * self.sign).greater(no), yes, no);
+        let longest = self.last.scale(CONTRACTION).least(V::lit(LONGEST_STEP));
+        let contracts = V::select(size.at_most(longest), same, no);
+        let small = V::select(size.at_most(V::lit(SMALL_STEP)), same, no);
+        let goes_on = V::select(V::lit(f64::from(PIECE_STEPS)).greater(self.steps), contracts, no);
+        self.last = size;
+        let course = V::select(goes_on.greater(no), V::lit(GOING), V::lit(LEFT));
+        (V::select(small.greater(no), V::lit(ARRIVED), course), contracts.greater(no))
+    }
+}
+
 #[derive(Clone, Copy, Debug)]
 struct Lane {
     stage: Stage,
-    steps: u32,
-    /// Size of the last step.
-    last: f64,
-    sign: f64,
+    piece: Piece<f64>,
 }
 
 impl Lane {
     fn new(lengths: &[f64]) -> Self {
         let valid = lengths.iter().all(|l| *l >= 0.0 && l.is_finite());
-        Lane {
-            stage: if valid { Stage::Going } else { Stage::Left },
-            steps: 0,
-            last: f64::INFINITY,
-            sign: f64::NAN,
-        }
+        let [steps, last, sign] = BEGINNING;
+        Lane { stage: if valid { Stage::Going } else { Stage::Left }, piece: Piece { steps, last, sign } }
     }
 
     fn is_under_way(&self) -> bool {
@@ -84,9 +132,8 @@ impl Lane {
     /// Sets the stage by a Newton step at the present pose; whether the step is to be made. In the order of
     /// [`continuation`](crate::forward::continuation) and [`polish`].
     fn judge(&mut self, at: &Newtons, k: usize) -> bool {
-        let (size, sign) = (at.size[k], at.sign[k]);
         if self.stage == Stage::Arrived {
-            self.sign = sign;
+            self.piece.sign = at.sign[k];
             self.stage = match (at.residual[k] <= ROUNDING, at.pivots[k] > FOLD_PIVOTS) {
                 (false, _) => Stage::Rounding,
                 (true, true) => Stage::Solved(Status::Ok),
@@ -94,18 +141,15 @@ impl Lane {
             };
             return false;
         }
-        if self.steps == 0 {
-            self.sign = sign;
-        }
-        self.steps += 1;
-        let contracts = sign == self.sign && size <= LONGEST_STEP && size <= CONTRACTION * self.last;
-        self.last = size;
-        if size <= SMALL_STEP && sign == self.sign {
-            self.stage = Stage::Arrived;
-        } else if !contracts || self.steps == PIECE_STEPS {
-            self.stage = Stage::Left;
-        }
-        contracts
+        let (course, made) = self.piece.judge(at.size[k], at.sign[k]);
+        self.stage = if course == ARRIVED {
+            Stage::Arrived
+        } else if course == LEFT {
+            Stage::Left
+        } else {
+            Stage::Going
+        };
+        made
     }
 
     /// What it has come to, by way of one state alone where it has left the others.
@@ -114,21 +158,56 @@ impl Lane {
         match self.stage {
             Stage::Solved(status) => {
                 let residual = error(mech, &squares, pose);
-                Found { pose: *pose, residual, iterations: self.steps, sign: self.sign, status }
+                Found {
+                    pose: *pose,
+                    residual,
+                    iterations: self.piece.steps as u32,
+                    sign: self.piece.sign,
+                    status,
+                }
             }
             Stage::Rounding => {
                 let found = polish(mech, &squares, pose);
-                Found { iterations: self.steps + found.iterations, ..found }
+                Found { iterations: self.piece.steps as u32 + found.iterations, ..found }
             }
             Stage::Going | Stage::Arrived | Stage::Left => forward_kinematics(mech, lengths, guess),
         }
     }
 }
 
-/// Newton steps towards `F = 0` and what they are judged by.
+/// A Newton step towards `F = 0`, or one in each lane, and what it is judged by.
+pub(crate) struct Newton<V> {
+    /// The pose after it.
+    pub(crate) next: Pose<V>,
+    pub(crate) size: V,
+    residual: V,
+    pivots: V,
+    pub(crate) sign: V,
+}
+
+#[inline(always)]
+pub(crate) fn newton<V: Lanes>(mech: &Mechanism, pose: &Pose<V>, squares: &[Row; 6], k: usize) -> Newton<V> {
+    let mut to = [V::zero(); 6];
+    for i in 0..6 {
+        to[i] = V::load(&squares[i][k..]);
+    }
+    let System { residual, matrix } = system(mech, pose, &to);
+    let (mut rhs, mut largest, mut sum) = (residual, V::zero(), V::zero());
+    for f in &mut rhs {
+        largest = largest.most(f.abs());
+        *f = -*f;
+    }
+    let Solved { x, pivots, sign } = solve(matrix, rhs);
+    for e in x {
+        sum = sum + e * e;
+    }
+    let next = pose.stepped(&step_of(mech, x, V::one()));
+    Newton { next, size: sum.sqrt(), residual: largest, pivots, sign }
+}
+
+/// Newton steps side by side.
 #[derive(Clone, Copy, Debug, Default)]
 struct Newtons {
-    /// The poses after the steps.
     next: Poses,
     size: Row,
     residual: Row,
@@ -148,33 +227,19 @@ impl Task for Evaluation<'_> {
     fn run<V: Lanes>(self) {
         let mut k = 0;
         while k < WIDTH {
-            let pose: Pose<V> = load(self.poses, k);
-            let mut squares = [V::zero(); 6];
-            for i in 0..6 {
-                squares[i] = V::load(&self.squares[i][k..]);
-            }
-            let System { residual, matrix } = system(self.mech, &pose, &squares);
-            let (mut rhs, mut largest, mut sum) = (residual, V::zero(), V::zero());
-            for f in &mut rhs {
-                largest = largest.most(f.abs());
-                *f = -*f;
-            }
-            let Solved { x, pivots, sign } = solve(matrix, rhs);
-            for e in x {
-                sum = sum + e * e;
-            }
-            store(&pose.stepped(&step_of(self.mech, x, V::one())), &mut self.result.next, k);
-            sum.sqrt().store(&mut self.result.size[k..]);
-            largest.store(&mut self.result.residual[k..]);
-            pivots.store(&mut self.result.pivots[k..]);
-            sign.store(&mut self.result.sign[k..]);
+            let at = newton::<V>(self.mech, &load(self.poses, k), self.squares, k);
+            store(&at.next, &mut self.result.next, k);
+            at.size.store(&mut self.result.size[k..]);
+            at.residual.store(&mut self.result.residual[k..]);
+            at.pivots.store(&mut self.result.pivots[k..]);
+            at.sign.store(&mut self.result.sign[k..]);
             k += V::WIDTH;
         }
     }
 }
 
 #[inline(always)]
-fn load<V: Lanes>(poses: &Poses, k: usize) -> Pose<V> {
+pub(crate) fn load<V: Lanes>(poses: &Poses, k: usize) -> Pose<V> {
     let mut columns = [Vec3::<V>::zero(); 4];
     for i in 0..4 {
         let [x, y, z] = [&poses[3 * i], &poses[3 * i + 1], &poses[3 * i + 2]];
@@ -185,7 +250,7 @@ fn load<V: Lanes>(poses: &Poses, k: usize) -> Pose<V> {
 }
 
 #[inline(always)]
-fn store<V: Lanes>(pose: &Pose<V>, poses: &mut Poses, k: usize) {
+pub(crate) fn store<V: Lanes>(pose: &Pose<V>, poses: &mut Poses, k: usize) {
     let [x, y, z] = pose.rotation.0;
     let columns = [x, y, z, pose.o];
     for i in 0..4 {
@@ -195,12 +260,12 @@ fn store<V: Lanes>(pose: &Pose<V>, poses: &mut Poses, k: usize) {
     }
 }
 
-fn get(poses: &Poses, k: usize) -> Pose<f64> {
+pub(crate) fn get(poses: &Poses, k: usize) -> Pose<f64> {
     let column = |i: usize| Vec3::new(poses[3 * i][k], poses[3 * i + 1][k], poses[3 * i + 2][k]);
     Pose { rotation: Mat3::from_columns(column(0), column(1), column(2)), o: column(3) }
 }
 
-fn put(poses: &mut Poses, k: usize, pose: &Pose<f64>) {
+pub(crate) fn put(poses: &mut Poses, k: usize, pose: &Pose<f64>) {
     let columns = pose.rotation.0.into_iter().chain([pose.o]);
     for (row, x) in poses.iter_mut().zip(columns.flat_map(Vec3::array)) {
         row[k] = x;

@@ -22,19 +22,31 @@ pub fn jacobian<T: Real>(mech: &Mechanism<impl Constant<T>>, pose: &Pose<T>) -> 
             count += 1;
         }
     }
-    for c in &mech.independent {
-        rows[count] = constraint::row(c, pose).array();
-        count += 1;
-    }
+    constraint_rows(mech, pose, &mut rows[count..]);
     rows
+}
+
+#[inline(always)]
+pub(crate) fn constraint_rows<T: Real>(
+    mech: &Mechanism<impl Constant<T>>,
+    pose: &Pose<T>,
+    rows: &mut [[T; 6]],
+) {
+    for k in 0..mech.independent.len() {
+        rows[k] = constraint::row(&mech.independent[k], pose).array();
+    }
 }
 
 /// J with its torque columns divided by the characteristic length: pure numbers, so that a pivot ratio means the
 /// same for every size of machine. It belongs to the twist (v, Λω).
 #[inline(always)]
 pub fn scaled_jacobian<T: Real>(mech: &Mechanism<impl Constant<T>>, pose: &Pose<T>) -> Matrix6<T> {
+    scaled(mech, jacobian(mech, pose))
+}
+
+#[inline(always)]
+pub(crate) fn scaled<T: Real>(mech: &Mechanism<impl Constant<T>>, mut rows: Matrix6<T>) -> Matrix6<T> {
     let inverse = T::lit(1.0 / mech.characteristic_length);
-    let mut rows = jacobian(mech, pose);
     for i in 0..6 {
         for j in 3..6 {
             rows[i][j] = rows[i][j] * inverse;

@@ -1,32 +1,24 @@
 //! The reachable workspace in joint space: the poses for a lattice of leg lengths, by continuation from one of them
 //! \[T41\].
+//!
+//! Nodes are kept in slabs, one for each index of the first axis. In a wave each slab predicts where steps from its own
+//! newest poses lead, and then takes in those that lead to it: slabs share the threads, and wait for nothing else.
+
+mod steps;
 
 use rayon::prelude::*;
 
-use crate::forward::{System, continuation, forward_kinematics, size, squares, step_of, system};
+use crate::forward::forward_kinematics;
+use crate::lanes::WIDTH;
 use crate::leg;
 use crate::limits::{Bound, Measure};
-use crate::linear::solve;
 use crate::mechanism::Mechanism;
-use crate::reach::{ON_LIMIT, margins, nearest};
 use crate::spatial::{Pose, Vec3};
 use crate::status::Status;
-
-/// Shortest piece of the way to a neighbour: what needs shorter ones is taken to end there. Near a singularity poses go
-/// by the root of the lengths, so that the end is known to an eighth of what one step makes there.
-const SHORTEST_PIECE: f64 = 1.0 / 64.0;
-
-/// Shortest piece of a continuation that is made in one.
-const WHOLE: f64 = 1.0;
-
-/// Share of a predicted step within which a known pose is the one that the step leads to.
-const PREDICTED: f64 = 0.25;
+use steps::{AXES, Met, Predicted, Room, Way, follow, marker, predict};
 
 /// Two poses with the same lengths and a marker this near are one, relative to the characteristic length.
 const SAME: f64 = 1e-4;
-
-/// Where the marker is in platform axes, in characteristic lengths: off every symmetry that a platform may have.
-const MARKER: Vec3<f64> = Vec3 { x: 0.53, y: 0.31, z: 0.79 };
 
 /// End of a list of poses.
 const NONE: u32 = u32::MAX;
@@ -36,9 +28,22 @@ const NONE: u32 = u32::MAX;
 struct Axis {
     least: f64,
     step: f64,
-    count: i64,
+    count: usize,
     /// The node nearest to the start pose.
-    center: i64,
+    center: usize,
+    /// From a node to the next along the axis; the last axis runs fastest.
+    stride: usize,
+}
+
+impl Axis {
+    /// Where a node is along the axis.
+    fn place(&self, node: usize) -> usize {
+        node / self.stride % self.count
+    }
+
+    fn length(&self, place: usize) -> f64 {
+        self.least + self.step * place as f64
+    }
 }
 
 /// A pose that has been reached, by its marker: a point of the platform tells poses with the same lengths apart.
@@ -49,16 +54,50 @@ struct Known {
     next: u32,
 }
 
+/// The nodes with one length of the first leg, and the poses reached there.
+#[derive(Clone, Debug)]
+struct Slab {
+    /// Index of its first node.
+    first: usize,
+    /// The pose of each node that was reached last.
+    last: Vec<u32>,
+    known: Vec<Known>,
+    /// Nodes that a step is under way to.
+    awaited: Vec<bool>,
+}
+
+/// Poses that a wave has reached in a slab, in the order of their nodes.
+#[derive(Clone, Debug, Default)]
+struct Front {
+    nodes: Vec<usize>,
+    poses: Vec<Pose<f64>>,
+    /// Directions, as bits, from which steps have led to the pose: the ways back are known.
+    came: Vec<u16>,
+}
+
+/// A step to a neighbour: along an axis by one node, back (even) or on (odd).
+#[derive(Clone, Copy, Debug)]
+struct Step {
+    direction: u8,
+    /// The pose that it is made from, by its place in the front.
+    source: u32,
+    node: usize,
+    /// Where the marker is at its end to first order, and how far from there it may be, m.
+    marker: [f32; 3],
+    within: f32,
+}
+
+/// Steps to the slab before, to the same one, and to the slab behind.
+type Steps = [Vec<Step>; 3];
+
 /// The poses at the nodes of the lattice, reached wave by wave. A node may have several: those of one aspect with the
-/// same lengths. Memory: 4 bytes for each node and 16 for each pose.
+/// same lengths. Memory: 5 bytes for each node and 16 for each pose, and 500 for each that a wave reaches.
 #[derive(Clone, Debug)]
 pub struct Lattice {
     axes: Vec<Axis>,
-    /// The pose of each node that was reached last; the last axis runs fastest.
-    last: Vec<u32>,
-    known: Vec<Known>,
-    /// The poses that the last wave reached, in order, with their nodes.
-    front: Vec<(usize, Pose<f64>)>,
+    slabs: Vec<Slab>,
+    /// The poses that the last wave reached in each slab.
+    fronts: Vec<Front>,
     pub reached: Reached,
     /// Least and greatest coordinates of o that are looked at, m.
     bounds: [[f64; 2]; 3],
@@ -77,20 +116,10 @@ pub struct Reached {
     pub at_limits: u64,
     /// Steps to a neighbour that end in a singularity.
     pub singular: u64,
-    /// Least and greatest coordinate of o, m: of these poses and of those passed on steps that end on the way.
+    /// Least and greatest coordinate of o, m: of these poses and of those passed on steps that are made in pieces.
     pub extents: [[f64; 2]; 3],
     /// Least and greatest x and y of o in each layer of z.
     pub profile: Vec<[f64; 4]>,
-}
-
-/// What a step to a neighbour came to.
-enum Step {
-    New(Pose<f64>),
-    /// Poses on the way up to its end.
-    Ends {
-        passed: Vec<Pose<f64>>,
-        singular: bool,
-    },
 }
 
 impl Reached {
@@ -99,6 +128,95 @@ impl Reached {
         let profile = vec![[none[0], none[1], none[0], none[1]]; layers];
         Reached { inside: 0, poses: 0, at_limits: 0, singular: 0, extents: [none; 3], profile }
     }
+
+    /// Takes a place of o into the extents.
+    fn record(&mut self, o: Vec3<f64>, layers: (f64, f64)) {
+        let o = o.array();
+        widen(self.extents.as_flattened_mut(), &[o[0], o[0], o[1], o[1], o[2], o[2]]);
+        // What is below the first layer counts to it.
+        let layer = ((o[2] - layers.0) / layers.1) as usize;
+        if let Some(p) = self.profile.get_mut(layer) {
+            widen(p, &[o[0], o[0], o[1], o[1]]);
+        }
+    }
+
+    /// Adds what another part of the lattice has met.
+    fn add(&mut self, other: &Self) {
+        self.inside += other.inside;
+        self.poses += other.poses;
+        self.at_limits += other.at_limits;
+        self.singular += other.singular;
+        widen(self.extents.as_flattened_mut(), other.extents.as_flattened());
+        widen(self.profile.as_flattened_mut(), other.profile.as_flattened());
+    }
+}
+
+/// Widens ranges, each a least and a greatest number, to hold others.
+fn widen(ranges: &mut [f64], others: &[f64]) {
+    for (range, other) in ranges.chunks_exact_mut(2).zip(others.chunks_exact(2)) {
+        if other[0] < range[0] {
+            range[0] = other[0];
+        }
+        if other[1] > range[1] {
+            range[1] = other[1];
+        }
+    }
+}
+
+impl Slab {
+    fn new(first: usize, nodes: usize) -> Self {
+        Slab { first, last: vec![NONE; nodes], known: vec![], awaited: vec![false; nodes] }
+    }
+
+    /// The first of the poses known at a node whose marker is within a distance of a place.
+    fn find(&self, node: usize, place: [f32; 3], within: f32) -> Option<usize> {
+        let mut at = self.last[node - self.first];
+        while let Some(known) = self.known.get(at as usize) {
+            let [x, y, z] = std::array::from_fn(|k| known.marker[k] - place[k]);
+            if x * x + y * y + z * z <= within * within {
+                return Some(at as usize);
+            }
+            at = known.next;
+        }
+        None
+    }
+
+    /// Keeps a new pose of a node.
+    fn keep(&mut self, node: usize, marker: [f32; 3]) {
+        let last = &mut self.last[node - self.first];
+        self.known.push(Known { marker, next: *last });
+        *last = u32::try_from(self.known.len() - 1).expect("fewer poses than memory holds");
+    }
+}
+
+impl Front {
+    fn push(&mut self, node: usize, pose: Pose<f64>, came: u16) {
+        self.nodes.push(node);
+        self.poses.push(pose);
+        self.came.push(came);
+    }
+
+    /// The same poses in the order of their nodes.
+    fn in_order(&self) -> Self {
+        let mut order: Vec<usize> = (0..self.nodes.len()).collect();
+        order.sort_by_key(|&i| self.nodes[i]);
+        Front {
+            nodes: order.iter().map(|&i| self.nodes[i]).collect(),
+            poses: order.iter().map(|&i| self.poses[i]).collect(),
+            came: order.iter().map(|&i| self.came[i]).collect(),
+        }
+    }
+}
+
+impl Step {
+    /// The direction back.
+    fn back(&self) -> u16 {
+        1 << (self.direction ^ 1)
+    }
+}
+
+fn short(place: Vec3<f64>) -> [f32; 3] {
+    place.array().map(|x| x as f32)
 }
 
 impl Lattice {
@@ -127,189 +245,329 @@ impl Lattice {
                 let pieces = ((most - least) / step).round().max(1.0);
                 let step = (most - least) / pieces;
                 let center = ((leg::position(leg, start).length - least) / step).round().clamp(0.0, pieces);
-                Some(Axis { least, step, count: pieces as i64 + 1, center: center as i64 })
+                Some(Axis { least, step, count: pieces as usize + 1, center: center as usize, stride: 1 })
             })
             .collect();
-        let axes = axes?;
-        let longest: f64 = axes.iter().map(|a| a.least + a.step * a.count as f64).fold(0.0, f64::max);
+        let mut axes = axes?;
+        let mut size = 1;
+        for axis in axes.iter_mut().rev() {
+            axis.stride = size;
+            size *= axis.count;
+        }
+        let longest = axes.iter().map(|a| a.length(a.count)).fold(0.0, f64::max);
         let middle = mech.legs.iter().map(|leg| leg.base.point.z).fold(0.0, f64::max);
         let reach = longest + mech.legs.iter().map(|leg| leg.platform.point.norm()).fold(0.0, f64::max);
-        let layers = (2.0 * reach / layer).ceil() as usize;
-        let size = axes.iter().map(|a| a.count as usize).product();
-        let mut lattice = Lattice {
-            axes,
-            last: vec![NONE; size],
-            known: vec![],
-            front: vec![],
-            reached: Reached::new(layers),
-            bounds,
-            layers: (middle - reach, layer),
-        };
-        let center = lattice.axes.iter().fold(0, |node, a| node * a.count + a.center);
-        let found = forward_kinematics(mech, &lattice.lengths(center), start);
-        if found.status != Status::Ok || !lattice.is_inside(mech, &found.pose) {
+        let layers = (middle - reach, layer);
+        let nodes = axes.first()?.stride;
+        let slabs: Vec<Slab> = (0..axes[0].count).map(|i| Slab::new(i * nodes, nodes)).collect();
+        let fronts = vec![Front::default(); slabs.len()];
+        let reached = Reached::new((2.0 * reach / layer).ceil() as usize);
+        let mut lattice = Lattice { axes, slabs, fronts, reached, bounds, layers };
+        let center: usize = lattice.axes.iter().map(|a| a.center * a.stride).sum();
+        let lengths: Vec<f64> = lattice.axes.iter().map(|a| a.length(a.center)).collect();
+        let found = forward_kinematics(mech, &lengths, start);
+        if found.status != Status::Ok || !(Room { mech, bounds: &lattice.bounds }).holds(&found.pose) {
             return None;
         }
-        lattice.keep(mech, center as usize, found.pose);
+        let first = lattice.axes[0].center;
+        lattice.slabs[first].keep(center, short(marker(mech, &found.pose)));
+        lattice.fronts[first].push(center, found.pose, 0);
+        lattice.reached.record(found.pose.o, layers);
+        (lattice.reached.inside, lattice.reached.poses) = (1, 1);
         Some(lattice)
     }
 
     /// Number of nodes.
     #[must_use]
     pub fn len(&self) -> usize {
-        self.last.len()
+        self.slabs.iter().map(|slab| slab.last.len()).sum()
     }
 
     #[must_use]
     pub fn is_empty(&self) -> bool {
-        self.last.is_empty()
+        self.len() == 0
     }
 
-    /// The lengths of a node.
-    fn lengths(&self, node: i64) -> Vec<f64> {
-        let mut rest = node;
-        let mut lengths: Vec<f64> = self
-            .axes
-            .iter()
-            .rev()
-            .map(|a| {
-                let i = rest % a.count;
-                rest /= a.count;
-                a.least + a.step * i as f64
-            })
-            .collect();
-        lengths.reverse();
-        lengths
-    }
-
-    /// The nodes one step away along each axis.
-    fn neighbours(&self, node: i64) -> impl Iterator<Item = usize> {
-        let mut stride = 1;
-        let along = self.axes.iter().rev().map(move |a| {
-            let (i, by) = (node / stride % a.count, stride);
-            stride *= a.count;
-            [(i > 0).then_some(node - by), (i + 1 < a.count).then_some(node + by)]
-        });
-        along.flatten().flatten().map(|n| n as usize)
-    }
-
-    /// The markers of the poses known at a node.
-    fn markers(&self, node: usize) -> impl Iterator<Item = Vec3<f64>> {
-        let list = std::iter::successors(self.known.get(self.last[node] as usize), |known| {
-            self.known.get(known.next as usize)
-        });
-        list.map(|known| Vec3::from(known.marker.map(f64::from)))
-    }
-
-    /// Whether a pose is in the bounds and keeps all limits. The lengths of a node on the stroke's end are there up to
-    /// rounding.
-    fn is_inside(&self, mech: &Mechanism, pose: &Pose<f64>) -> bool {
-        let in_bounds = pose.o.array().iter().zip(&self.bounds).all(|(x, [low, high])| low <= x && x <= high);
-        in_bounds && nearest(mech, &margins(mech, pose)) >= -ON_LIMIT
+    /// The squared lengths of a node.
+    fn squares(&self, node: usize) -> [f64; 6] {
+        let mut squares = [0.0; 6];
+        for (square, axis) in squares.iter_mut().zip(&self.axes) {
+            let length = axis.length(axis.place(node));
+            *square = length * length;
+        }
+        squares
     }
 
     /// Steps from the poses of the last wave to the neighbours of their nodes; the number of new poses. Those at one node
     /// are found in the order of the poses that they are reached from: the number of threads changes nothing.
     pub fn wave(&mut self, mech: &Mechanism) -> usize {
-        let mut steps: Vec<(usize, usize)> = Vec::new();
-        for (i, &(node, _)) in self.front.iter().enumerate() {
-            steps.extend(self.neighbours(node as i64).map(|n| (n, i)));
+        let steps: Vec<Steps> = self.fronts.par_iter().map(|front| self.steps(mech, front)).collect();
+        let mut slabs = std::mem::take(&mut self.slabs);
+        let found: Vec<(Front, Reached)> = slabs
+            .par_iter_mut()
+            .enumerate()
+            .map(|(i, slab)| {
+                // From the slabs before, within, and behind, which is the order of the poses.
+                let before = i.checked_sub(1).map(|i| &steps[i][2]);
+                let behind = steps.get(i + 1).map(|steps| &steps[0]);
+                let steps = before.into_iter().chain([&steps[i][1]]).chain(behind).flatten();
+                self.receive(mech, slab, i, steps.copied())
+            })
+            .collect();
+        self.slabs = slabs;
+        self.fronts.clear();
+        for (front, reached) in found {
+            self.reached.add(&reached);
+            self.fronts.push(front);
         }
-        steps.par_sort_unstable();
-        let by_node: Vec<&[(usize, usize)]> = steps.chunk_by(|a, b| a.0 == b.0).collect();
-        let found: Vec<Vec<Step>> = by_node.par_iter().map(|steps| self.steps_to(mech, steps)).collect();
-        let nodes: Vec<usize> = by_node.iter().map(|steps| steps[0].0).collect();
-        self.front.clear();
-        for (node, steps) in nodes.into_iter().zip(found) {
-            for step in steps {
-                match step {
-                    Step::New(pose) => self.keep(mech, node, pose),
-                    Step::Ends { passed, singular } => {
-                        for pose in &passed {
-                            self.record(pose);
+        self.fronts.iter().map(|front| front.nodes.len()).sum()
+    }
+
+    /// The steps from the poses of a front, without those back.
+    fn steps(&self, mech: &Mechanism, front: &Front) -> Steps {
+        let mut steps = Steps::default();
+        let (mut changes, mut predicted) = ([[[0.0; WIDTH]; 2]; AXES], Predicted::default());
+        for start in (0..front.nodes.len()).step_by(WIDTH) {
+            let nodes = &front.nodes[start..front.nodes.len().min(start + WIDTH)];
+            for (axis, changes) in self.axes.iter().zip(&mut changes) {
+                for (k, &node) in nodes.iter().enumerate() {
+                    let square = |place: f64| (axis.least + axis.step * place).powi(2);
+                    let place = axis.place(node) as f64;
+                    changes[0][k] = square(place - 1.0) - square(place);
+                    changes[1][k] = square(place + 1.0) - square(place);
+                }
+            }
+            predict(mech, &front.poses[start..start + nodes.len()], &changes, &mut predicted);
+            for (k, &node) in nodes.iter().enumerate() {
+                for (a, axis) in self.axes.iter().enumerate() {
+                    let place = axis.place(node);
+                    for on in 0..2 {
+                        let direction = 2 * a + on;
+                        let leaves = if on == 1 { place + 1 == axis.count } else { place == 0 };
+                        if leaves || front.came[start + k] >> direction & 1 == 1 {
+                            continue;
                         }
-                        self.reached.singular += u64::from(singular);
-                        self.reached.at_limits += u64::from(!singular);
+                        let to = if a == 0 { 2 * on } else { 1 };
+                        steps[to].push(Step {
+                            direction: direction as u8,
+                            source: (start + k) as u32,
+                            node: if on == 1 { node + axis.stride } else { node - axis.stride },
+                            marker: predicted.marker(a, on, k),
+                            within: predicted.within(a, on, k),
+                        });
                     }
                 }
             }
         }
-        self.front.len()
+        steps
     }
 
-    /// Steps to one node from poses of the last wave, (node, index of the pose), without those to a pose known there.
-    fn steps_to(&self, mech: &Mechanism, steps: &[(usize, usize)]) -> Vec<Step> {
-        let (node, scale) = (steps[0].0, mech.characteristic_length);
-        let to = squares(&self.lengths(node as i64));
-        let mut markers: Vec<Vec3<f64>> = self.markers(node).collect();
-        let is_known = |markers: &[Vec3<f64>], pose: &Pose<f64>, within: f64| {
-            markers.iter().any(|&known| (known - marker(mech, pose)).norm() <= within * scale)
+    /// Makes the steps to a slab that lead to no pose known there. Where several lead to one node, the first of them is
+    /// made, and the others wait for what it finds.
+    fn receive(
+        &self,
+        mech: &Mechanism,
+        slab: &mut Slab,
+        index: usize,
+        steps: impl Iterator<Item = Step>,
+    ) -> (Front, Reached) {
+        let room = Room { mech, bounds: &self.bounds };
+        let same = (SAME * mech.characteristic_length) as f32;
+        let (mut front, mut reached) = (Front::default(), Reached::new(self.reached.profile.len()));
+        let known_before = slab.known.len();
+        let mut waiting: Vec<Step> = steps.collect();
+        while !waiting.is_empty() {
+            let mut made = Vec::new();
+            waiting.retain(|step| {
+                if let Some(known) = slab.find(step.node, step.marker, step.within) {
+                    if known >= known_before {
+                        front.came[known - known_before] |= step.back();
+                    }
+                    return false;
+                }
+                let awaited = &mut slab.awaited[step.node - slab.first];
+                if !std::mem::replace(awaited, true) {
+                    made.push(*step);
+                    return false;
+                }
+                true
+            });
+            let ways = made.iter().enumerate().map(|(i, step)| self.way(i, index, step));
+            follow(room, ways, |i, met| match met {
+                Met::Place(o) => reached.record(o, self.layers),
+                Met::Limit => reached.at_limits += 1,
+                Met::Singularity => reached.singular += 1,
+                Met::Pose(pose) => {
+                    let (step, marker) = (&made[i], short(marker(mech, &pose)));
+                    if let Some(known) = slab.find(step.node, marker, same) {
+                        if known >= known_before {
+                            front.came[known - known_before] |= step.back();
+                        }
+                        return;
+                    }
+                    reached.inside += u64::from(slab.last[step.node - slab.first] == NONE);
+                    reached.poses += 1;
+                    reached.record(pose.o, self.layers);
+                    slab.keep(step.node, marker);
+                    front.push(step.node, pose, step.back());
+                }
+            });
+            for step in &made {
+                slab.awaited[step.node - slab.first] = false;
+            }
+        }
+        (front.in_order(), reached)
+    }
+
+    /// The way of a step to the slab with an index.
+    fn way(&self, number: usize, slab: usize, step: &Step) -> Way {
+        let source = match step.direction {
+            0 => slab + 1,
+            1 => slab - 1,
+            _ => slab,
         };
-        let mut found = Vec::new();
-        for &(_, i) in steps {
-            let (neighbour, pose) = &self.front[i];
-            let System { residual, matrix } = system(mech, pose, &to);
-            let x = solve(matrix, residual.map(|f| -f)).x;
-            if is_known(&markers, &pose.stepped(&step_of(mech, x, 1.0)), PREDICTED * size(&x)) {
-                continue;
-            }
-            match self.step(mech, pose, &squares(&self.lengths(*neighbour as i64)), &to) {
-                Step::New(pose) if is_known(&markers, &pose, SAME) => {}
-                step => {
-                    if let Step::New(pose) = &step {
-                        markers.push(marker(mech, pose));
-                    }
-                    found.push(step);
-                }
-            }
-        }
-        found
-    }
-
-    /// Continues from a pose to other lengths, both given by their squares, in pieces that are halved where the way ends.
-    fn step(&self, mech: &Mechanism, pose: &Pose<f64>, from: &[f64; 6], to: &[f64; 6]) -> Step {
-        let (mut passed, mut t, mut piece) = (vec![*pose], 0.0, 1.0);
-        while t < 1.0 {
-            let next: f64 = t + piece;
-            let squares = std::array::from_fn(|k| (1.0 - next) * from[k] + next * to[k]);
-            let (continued, _) = continuation(mech, &squares, &passed[passed.len() - 1], WHOLE);
-            match continued {
-                Some(pose) if self.is_inside(mech, &pose) => {
-                    passed.push(pose);
-                    t = next;
-                }
-                _ if piece <= SHORTEST_PIECE => return Step::Ends { passed, singular: continued.is_none() },
-                _ => piece *= 0.5,
-            }
-        }
-        Step::New(passed[passed.len() - 1])
-    }
-
-    /// Keeps a new pose of a node.
-    fn keep(&mut self, mech: &Mechanism, node: usize, pose: Pose<f64>) {
-        let last = &mut self.last[node];
-        self.reached.inside += u64::from(*last == NONE);
-        self.reached.poses += 1;
-        self.known.push(Known { marker: marker(mech, &pose).array().map(|x| x as f32), next: *last });
-        *last = u32::try_from(self.known.len() - 1).expect("fewer poses than memory holds");
-        self.front.push((node, pose));
-        self.record(&pose);
-    }
-
-    /// Takes a pose into the extents.
-    fn record(&mut self, pose: &Pose<f64>) {
-        let (reached, o) = (&mut self.reached, pose.o.array());
-        for (extent, x) in reached.extents.iter_mut().zip(o) {
-            *extent = [extent[0].min(x), extent[1].max(x)];
-        }
-        let layer = ((o[2] - self.layers.0) / self.layers.1).floor();
-        if let Some(p) = reached.profile.get_mut(layer.max(0.0) as usize) {
-            *p = [p[0].min(o[0]), p[1].max(o[0]), p[2].min(o[1]), p[3].max(o[1])];
-        }
+        let (front, i) = (&self.fronts[source], step.source as usize);
+        let along = usize::from(step.direction / 2);
+        let axis = &self.axes[along];
+        let from = axis.length(axis.place(front.nodes[i]));
+        Way::new(number, front.poses[i], along, from * from, self.squares(step.node))
     }
 }
 
-/// Where a pose has the point by which it is known.
-fn marker(mech: &Mechanism, pose: &Pose<f64>) -> Vec3<f64> {
-    pose.o + pose.rotation * (MARKER * mech.characteristic_length)
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::common::published;
+    use crate::coordinates::Set;
+    use crate::forward::{continuation, size, step_of, system};
+    use crate::lanes;
+    use crate::limits::Limit;
+    use crate::linear::solve;
+    use crate::mechanism::Side;
+    use crate::reach::{ON_LIMIT, margins};
+
+    const BOUNDS: [[f64; 2]; 3] = [[-0.8, 0.8], [-0.8, 0.8], [0.5, 1.0]];
+
+    /// The published manipulator; with a cone and a floor of the conditioning as well, the latter tested pose by pose.
+    fn mechanisms() -> [Mechanism; 2] {
+        let mut limited = published();
+        let limit = |measure, bound| Limit { name: String::new(), measure, bound, scale: 1.0 };
+        limited.limits.push(limit(Measure::Cone(0, Side::Platform), Bound::Most(2.0)));
+        limited.limits.push(limit(Measure::Conditioning, Bound::Least(0.03)));
+        [published(), limited]
+    }
+
+    fn lattice(mech: &Mechanism, step: f64) -> Lattice {
+        let start = Set::of(mech)[1].pose(mech, &[0.0, 0.0, 0.74, 0.3, 0.1, 0.0, 0.0]);
+        Lattice::new(mech, &start, BOUNDS, step, 0.01).expect("a start")
+    }
+
+    /// The steps from the poses of the last wave as ways, with the poses and squared lengths at both ends.
+    fn ways(mech: &Mechanism, lattice: &Lattice) -> Vec<(Way, Pose<f64>, [[f64; 6]; 2])> {
+        let mut ways = Vec::new();
+        for (slab, front) in lattice.fronts.iter().enumerate() {
+            for (to, steps) in lattice.steps(mech, front).iter().enumerate() {
+                for step in steps {
+                    let (node, pose) = (front.nodes[step.source as usize], front.poses[step.source as usize]);
+                    let ends = [lattice.squares(node), lattice.squares(step.node)];
+                    ways.push((lattice.way(ways.len(), slab + to - 1, step), pose, ends));
+                }
+            }
+        }
+        ways
+    }
+
+    /// The same way alone, by what defines it.
+    fn alone(mech: &Mechanism, pose: &Pose<f64>, [from, to]: &[[f64; 6]; 2]) -> Vec<Met> {
+        // Shares of the way that are to be reached next, the nearest one last.
+        let (mut pose, mut share, mut goals, mut met) = (*pose, 0.0, vec![1.0], vec![]);
+        while let Some(&goal) = goals.last() {
+            let ahead = std::array::from_fn(|k| {
+                if from[k] == to[k] { to[k] } else { (1.0 - goal) * from[k] + goal * to[k] }
+            });
+            let found = continuation(mech, &ahead, &pose, 1.0).0;
+            let inside = |pose: &Pose<f64>| {
+                let o = pose.o.array();
+                (0..3).all(|k| BOUNDS[k][0] <= o[k] && o[k] <= BOUNDS[k][1])
+                    && margins(mech, pose).iter().all(|margin| *margin >= -ON_LIMIT)
+            };
+            match found {
+                Some(found) if inside(&found) => {
+                    (pose, share) = (found, goal);
+                    met.push(if goal < 1.0 { Met::Place(pose.o) } else { Met::Pose(pose) });
+                    goals.pop();
+                }
+                _ if goal - share > 1.0 / 64.0 => goals.push(0.5 * (share + goal)),
+                Some(_) => return [met, vec![Met::Limit]].concat(),
+                None => return [met, vec![Met::Singularity]].concat(),
+            }
+        }
+        met
+    }
+
+    #[test]
+    fn ways_side_by_side_are_those_alone_bit_by_bit() {
+        let (mut limits, mut singularities, mut poses) = (0, 0, 0);
+        for mech in mechanisms() {
+            let mut lattice = lattice(&mech, 0.05);
+            for _ in 0..5 {
+                lattice.wave(&mech);
+            }
+            let ways = ways(&mech, &lattice);
+            println!("{} ways", ways.len());
+            assert!(ways.len() > 200);
+            let each: Vec<String> =
+                ways.iter().map(|(_, pose, ends)| format!("{:?}", alone(&mech, pose, ends))).collect();
+            for set in lanes::instruction_sets() {
+                lanes::use_instructions(set);
+                let mut met = vec![vec![]; ways.len()];
+                let room = Room { mech: &mech, bounds: &BOUNDS };
+                follow(room, ways.iter().map(|(way, ..)| way.clone()), |i, one| {
+                    limits += u32::from(matches!(one, Met::Limit));
+                    singularities += u32::from(matches!(one, Met::Singularity));
+                    poses += u32::from(matches!(one, Met::Pose(_)));
+                    met[i].push(one);
+                });
+                for (met, alone) in met.iter().zip(&each) {
+                    assert_eq!(format!("{met:?}"), *alone, "{set}");
+                }
+            }
+        }
+        assert!(limits > 100 && singularities > 100 && poses > 1000, "{limits} {singularities} {poses}");
+    }
+
+    #[test]
+    fn steps_are_predicted_by_the_first_newton_step() {
+        let mech = published();
+        let mut lattice = lattice(&mech, 0.05);
+        lattice.wave(&mech);
+        lattice.wave(&mech);
+        let mut count = 0;
+        for front in &lattice.fronts {
+            for step in lattice.steps(&mech, front).iter().flatten() {
+                let pose = &front.poses[step.source as usize];
+                let at = system(&mech, pose, &lattice.squares(step.node));
+                let x = solve(at.matrix, at.residual.map(|f| -f)).x;
+                let next = pose.stepped(&step_of(&mech, x, 1.0));
+                let off = marker(&mech, &next) - Vec3::from(step.marker.map(f64::from));
+                assert!(off.norm() < 1e-6 * mech.characteristic_length);
+                let within = 0.25 * size(&x) * mech.characteristic_length;
+                assert!((f64::from(step.within) - within).abs() < 1e-6 * within);
+                count += 1;
+            }
+        }
+        assert!(count > 100);
+    }
+
+    #[test]
+    fn no_step_leads_back() {
+        let mech = published();
+        let mut lattice = lattice(&mech, 0.05);
+        let start = lattice.fronts.iter().find_map(|front| front.nodes.first().copied());
+        lattice.wave(&mech);
+        for front in &lattice.fronts {
+            let steps = lattice.steps(&mech, front);
+            assert!(steps.iter().flatten().all(|step| Some(step.node) != start));
+        }
+    }
 }

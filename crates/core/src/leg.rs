@@ -88,11 +88,11 @@ impl<T: Real> Frame<T> {
     }
 }
 
-/// [T5] `n = (u×δ)/|u×δ|` for a U joint, `n = u` for R and F.
+/// [T5] N, along n: `u×δ` for a U joint, `u` for R and F.
 #[inline(always)]
-pub fn frame<T: Real>(leg: &Leg<impl Constant<T>>, pose: &Pose<T>, p: &Position<T>) -> Frame<T> {
+pub fn normal<T: Real>(leg: &Leg<impl Constant<T>>, pose: &Pose<T>, p: &Position<T>) -> Vec3<T> {
     let (u, _) = turning_axis(leg.turning, pose);
-    let normal = match leg.turning {
+    match leg.turning {
         Turning::Across(..) => u.cross(p.delta),
         // Any direction will do; the second is for a leg that comes near the first.
         Turning::Free(first) => {
@@ -101,7 +101,13 @@ pub fn frame<T: Real>(leg: &Leg<impl Constant<T>>, pose: &Pose<T>, p: &Position<
             Vec3::new(T::select(clear, a.x, b.x), T::select(clear, a.y, b.y), T::select(clear, a.z, b.z))
         }
         Turning::Along(..) => u,
-    };
+    }
+}
+
+/// [T5] `n = N/|N|`.
+#[inline(always)]
+pub fn frame<T: Real>(leg: &Leg<impl Constant<T>>, pose: &Pose<T>, p: &Position<T>) -> Frame<T> {
+    let ((u, _), normal) = (turning_axis(leg.turning, pose), normal(leg, pose, p));
     let sine = normal.norm();
     let inverse = T::one() / sine;
     let n = normal * inverse;

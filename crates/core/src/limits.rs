@@ -151,7 +151,7 @@ impl Limit {
     #[inline(always)]
     pub fn of_joint<T: Trig>(&self, mech: &Mechanism, pose: &Pose<T>, seen: &mut Seen<T>) -> T {
         match &self.measure {
-            Measure::Length(leg) => seen.position(mech, pose, *leg).length,
+            Measure::Length(leg) => seen.length(mech, pose, *leg),
             Measure::Cone(leg, side) => cone(mech, *leg, *side, pose, seen),
             Measure::Angle(leg, side, zero) => angle(mech, *leg, *side, zero, pose, seen),
             Measure::RodAngle(rod, zero) => rod_angle(mech, *rod, zero, pose, seen),
@@ -203,25 +203,48 @@ impl Limit {
     }
 }
 
-/// Where the leg is that was looked at last: limits that come one after the other are often those of one leg.
-#[derive(Clone, Copy, Debug)]
-pub struct Seen<T>(Option<(usize, Position<T>)>);
+/// As many legs as lengths are remembered of.
+const REMEMBERED: usize = 8;
 
-impl<T> Default for Seen<T> {
+/// What has been seen of the legs at a pose, for all limits that are looked at there.
+#[derive(Clone, Copy, Debug)]
+pub struct Seen<T> {
+    /// Of the first legs.
+    lengths: [T; REMEMBERED],
+    count: usize,
+    /// The leg that was looked at last: limits that come one after the other are often those of one leg.
+    last: Option<(usize, Position<T>)>,
+}
+
+impl<T: Real> Default for Seen<T> {
     #[inline(always)]
     fn default() -> Self {
-        Seen(None)
+        Seen { lengths: [T::zero(); REMEMBERED], count: 0, last: None }
     }
 }
 
 impl<T: Real> Seen<T> {
+    /// Remembers the next leg's length.
+    #[inline(always)]
+    pub(crate) fn next(&mut self, p: &Position<T>) {
+        if self.count < REMEMBERED {
+            self.lengths[self.count] = p.length;
+            self.count += 1;
+        }
+    }
+
+    #[inline(always)]
+    fn length(&mut self, mech: &Mechanism, pose: &Pose<T>, leg: usize) -> T {
+        if leg < self.count { self.lengths[leg] } else { self.position(mech, pose, leg).length }
+    }
+
     #[inline(always)]
     fn position(&mut self, mech: &Mechanism, pose: &Pose<T>, leg: usize) -> Position<T> {
-        match self.0 {
+        match self.last {
             Some((last, position)) if last == leg => position,
             _ => {
                 let position = leg::position(&mech.legs[leg], pose);
-                self.0 = Some((leg, position));
+                self.last = Some((leg, position));
                 position
             }
         }

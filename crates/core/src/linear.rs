@@ -29,6 +29,21 @@ pub fn solve_all<T: Real, const N: usize, const M: usize>(
     solve_first(m, rhs, N)
 }
 
+macro_rules! for_six {
+    ($k:ident => $body:expr) => {{
+        for_six!($k 0 $body);
+        for_six!($k 1 $body);
+        for_six!($k 2 $body);
+        for_six!($k 3 $body);
+        for_six!($k 4 $body);
+        for_six!($k 5 $body);
+    }};
+    ($k:ident $at:literal $body:expr) => {{
+        let $k = $at;
+        $body;
+    }};
+}
+
 /// Solves the first `size` equations in as many unknowns for several right-hand sides by Gaussian elimination with
 /// partial pivoting, rows exchanged by [`Real::select`]; the rest is not read.
 #[inline(always)]
@@ -39,31 +54,12 @@ pub fn solve_first<T: Real, const N: usize, const M: usize>(
 ) -> Solved<T, [[T; N]; M]> {
     let mut sign = T::Value::one();
     let mut inverses = [T::zero(); N];
-    for k in 0..size {
-        // Bubble the largest entry of column k up to the diagonal.
-        for i in k + 1..size {
-            let larger = m[i][k].value().abs().greater(m[k][k].value().abs());
-            for j in k..size {
-                let (a, b) = (m[k][j], m[i][j]);
-                m[k][j] = T::select(larger, b, a);
-                m[i][j] = T::select(larger, a, b);
-            }
-            sign = T::Value::select(larger, -sign, sign);
-            for x in &mut rhs {
-                let (a, b) = (x[k], x[i]);
-                x[k] = T::select(larger, b, a);
-                x[i] = T::select(larger, a, b);
-            }
-        }
-        inverses[k] = T::one() / m[k][k];
-        for i in k + 1..size {
-            let factor = -(m[i][k] * inverses[k]);
-            for j in k + 1..size {
-                m[i][j] = factor.mul_add(m[k][j], m[i][j]);
-            }
-            for x in &mut rhs {
-                x[i] = factor.mul_add(x[k], x[i]);
-            }
+    if N == 6 && size == 6 && size_of::<T>() == size_of::<T::Value>() {
+        // Unrolled, the rows stay in registers.
+        for_six!(k => eliminate(&mut m, &mut rhs, &mut inverses, &mut sign, k, 6));
+    } else {
+        for k in 0..size {
+            eliminate(&mut m, &mut rhs, &mut inverses, &mut sign, k, size);
         }
     }
     let (mut least, mut most) = (T::Value::lit(f64::INFINITY), T::Value::zero());
@@ -80,6 +76,43 @@ pub fn solve_first<T: Real, const N: usize, const M: usize>(
         (least, most) = (least.least(pivot.abs()), most.most(pivot.abs()));
     }
     Solved { x: rhs, pivots: least / most, sign }
+}
+
+/// Column k of the elimination.
+#[inline(always)]
+fn eliminate<T: Real, const N: usize, const M: usize>(
+    m: &mut [[T; N]; N],
+    rhs: &mut [[T; N]; M],
+    inverses: &mut [T; N],
+    sign: &mut T::Value,
+    k: usize,
+    size: usize,
+) {
+    // Bubble the largest entry of column k up to the diagonal.
+    for i in k + 1..size {
+        let larger = m[i][k].value().abs().greater(m[k][k].value().abs());
+        for j in k..size {
+            let (a, b) = (m[k][j], m[i][j]);
+            m[k][j] = T::select(larger, b, a);
+            m[i][j] = T::select(larger, a, b);
+        }
+        *sign = T::Value::select(larger, -*sign, *sign);
+        for x in &mut *rhs {
+            let (a, b) = (x[k], x[i]);
+            x[k] = T::select(larger, b, a);
+            x[i] = T::select(larger, a, b);
+        }
+    }
+    inverses[k] = T::one() / m[k][k];
+    for i in k + 1..size {
+        let factor = -(m[i][k] * inverses[k]);
+        for j in k + 1..size {
+            m[i][j] = factor.mul_add(m[k][j], m[i][j]);
+        }
+        for x in &mut *rhs {
+            x[i] = factor.mul_add(x[k], x[i]);
+        }
+    }
 }
 
 /// The determinant by expansion along the rows, each minor once: `d[S]` is that of the first |S| rows and the columns

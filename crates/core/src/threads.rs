@@ -1,8 +1,8 @@
-//! The threads that batches share.
+//! The threads that batches and searches share.
 
 use std::sync::{Arc, Mutex, PoisonError};
 
-use rayon::{ThreadPool, ThreadPoolBuilder};
+use rayon::{ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
 
 /// The threads of a process, and how many are asked for (0 for one on each core).
 struct Threads {
@@ -34,8 +34,29 @@ pub fn count() -> usize {
     }
 }
 
+/// Threads for a search that takes long: those that batches share, or some of its own.
+pub struct Team(Option<ThreadPool>);
+
+impl Team {
+    /// So many threads; 0 for those that batches share.
+    ///
+    /// # Errors
+    /// If the system gives no such threads.
+    pub fn new(count: usize) -> Result<Self, ThreadPoolBuildError> {
+        let own = (count > 0).then(|| ThreadPoolBuilder::new().num_threads(count).build());
+        own.transpose().map(Team)
+    }
+
+    pub fn install<T: Send>(&self, task: impl FnOnce() -> T + Send) -> T {
+        match &self.0 {
+            Some(pool) => pool.install(task),
+            None => install(task),
+        }
+    }
+}
+
 /// Runs a task on the shared threads.
-pub(crate) fn install(task: impl FnOnce() + Send) {
+pub(crate) fn install<T: Send>(task: impl FnOnce() -> T + Send) -> T {
     match pool() {
         Some(pool) => pool.install(task),
         None => task(),

@@ -9,7 +9,7 @@ mod workspace;
 
 use std::sync::OnceLock;
 
-use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray1};
+use numpy::{PyArray1, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use polypod_core::assembly::assemble;
 use polypod_core::batch::{self, Coordinates, Loads, Space, States, Table};
 use polypod_core::coordinates::Set;
@@ -40,7 +40,8 @@ pyo3::create_exception!(
     "All faults of a mechanism as (place, message)."
 );
 
-type Array<'py> = PyReadonlyArray1<'py, f64>;
+/// States one after the other, whatever the shape of the batch.
+type Array<'py> = PyReadonlyArrayDyn<'py, f64>;
 
 /// The one place where errors of the core become errors of Python.
 fn raise(faults: Vec<Fault>) -> PyErr {
@@ -48,6 +49,10 @@ fn raise(faults: Vec<Fault>) -> PyErr {
 }
 
 fn slice<'a>(array: &'a Array<'_>) -> PyResult<&'a [f64]> {
+    // Columns one after the other are contiguous, too, and would be read in the wrong order.
+    if !array.is_c_contiguous() {
+        return Err(PyValueError::new_err("needs a contiguous array"));
+    }
     array.as_slice().map_err(|_| PyValueError::new_err("needs a contiguous array"))
 }
 

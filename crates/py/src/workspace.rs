@@ -5,11 +5,11 @@ use polypod_core::batch::pose_of;
 use polypod_core::lattice::Lattice;
 use polypod_core::reach::fit;
 use polypod_core::spatial::{Pose, Vec3};
+use polypod_core::threads::Team;
 use polypod_core::workspace::{Flood, Grid, Stop};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use crate::{Array, PyMechanism, slice};
 
@@ -18,12 +18,8 @@ const SINGULARITY: i64 = -1;
 const GRID: i64 = -2;
 const SEARCH: i64 = -3;
 
-/// Threads of a search; all cores for zero.
-fn pool(threads: usize) -> PyResult<ThreadPool> {
-    ThreadPoolBuilder::new()
-        .num_threads(threads)
-        .build()
-        .map_err(|e| PyValueError::new_err(format!("threads: {e}")))
+fn team(threads: usize) -> PyResult<Team> {
+    Team::new(threads).map_err(|e| PyValueError::new_err(format!("threads: {e}")))
 }
 
 fn start_pose(start: &Array<'_>) -> PyResult<Pose<f64>> {
@@ -53,7 +49,7 @@ pub fn fit_poses<'py>(
 pub struct PyFlood {
     mech: Py<PyMechanism>,
     flood: Flood,
-    pool: ThreadPool,
+    team: Team,
 }
 
 #[pymethods]
@@ -72,20 +68,20 @@ impl PyFlood {
     ) -> PyResult<Option<Self>> {
         let grid = Grid { origin: Vec3::from(origin), step, counts };
         let flood = Flood::new(mech.get().core(), grid, &start_pose(&start)?, keep_aspect);
-        let pool = pool(threads)?;
-        Ok(flood.map(|flood| PyFlood { mech, flood, pool }))
+        let team = team(threads)?;
+        Ok(flood.map(|flood| PyFlood { mech, flood, team }))
     }
 
     /// The number of nodes that the next wave reaches.
     fn wave(&mut self, py: Python<'_>) -> usize {
-        let (mech, pool, flood) = (self.mech.get().core(), &self.pool, &mut self.flood);
-        py.detach(|| pool.install(|| flood.wave(mech)))
+        let (mech, team, flood) = (self.mech.get().core(), &self.team, &mut self.flood);
+        py.detach(|| team.install(|| flood.wave(mech)))
     }
 
     /// The number of nodes that are reached in smaller steps only; waves may go on from them.
     fn retry(&mut self, py: Python<'_>) -> usize {
-        let (mech, pool, flood) = (self.mech.get().core(), &self.pool, &mut self.flood);
-        py.detach(|| pool.install(|| flood.retry(mech)))
+        let (mech, team, flood) = (self.mech.get().core(), &self.team, &mut self.flood);
+        py.detach(|| team.install(|| flood.retry(mech)))
     }
 
     /// Which nodes are reached, flat, z fastest.
@@ -95,8 +91,8 @@ impl PyFlood {
 
     /// The cut edges: reached node, direction (-x, x, -y, y, -z, z), share inside, pose, what stops it, margin.
     fn edges<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let (mech, pool, flood) = (self.mech.get().core(), &self.pool, &self.flood);
-        let edges = py.detach(|| pool.install(|| flood.edges(mech)));
+        let (mech, team, flood) = (self.mech.get().core(), &self.team, &self.flood);
+        let edges = py.detach(|| team.install(|| flood.edges(mech)));
         let stop = |stop: Stop| match stop {
             Stop::Limit(i) => i as i64,
             Stop::Singularity => SINGULARITY,
@@ -121,7 +117,7 @@ impl PyFlood {
 pub struct PyLattice {
     mech: Py<PyMechanism>,
     lattice: Lattice,
-    pool: ThreadPool,
+    team: Team,
 }
 
 #[pymethods]
@@ -137,14 +133,14 @@ impl PyLattice {
         threads: usize,
     ) -> PyResult<Option<Self>> {
         let lattice = Lattice::new(mech.get().core(), &start_pose(&start)?, bounds, step, layer);
-        let pool = pool(threads)?;
-        Ok(lattice.map(|lattice| PyLattice { mech, lattice, pool }))
+        let team = team(threads)?;
+        Ok(lattice.map(|lattice| PyLattice { mech, lattice, team }))
     }
 
     /// The number of poses that the next wave reaches.
     fn wave(&mut self, py: Python<'_>) -> usize {
-        let (mech, pool, lattice) = (self.mech.get().core(), &self.pool, &mut self.lattice);
-        py.detach(|| pool.install(|| lattice.wave(mech)))
+        let (mech, team, lattice) = (self.mech.get().core(), &self.team, &mut self.lattice);
+        py.detach(|| team.install(|| lattice.wave(mech)))
     }
 
     #[getter]

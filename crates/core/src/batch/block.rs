@@ -57,6 +57,13 @@ impl<V: Lanes> Codes<V> {
         Codes(V::select(holds, self.0, first))
     }
 
+    /// These codes, and the next ones where all was well so far.
+    #[must_use]
+    #[inline(always)]
+    pub(super) fn then(self, next: Self) -> Self {
+        Codes(V::select(self.are(Status::Ok), next.0, self.0))
+    }
+
     /// The same with numbers answered all the same.
     #[must_use]
     #[inline(always)]

@@ -6,7 +6,7 @@ use crate::forward_dynamics::square;
 use crate::lanes::Lanes;
 use crate::leg;
 use crate::limits::{Limit, Seen};
-use crate::mechanism::{Constraint, Mechanism, Turning};
+use crate::mechanism::{Constraint, Leg, Mechanism, Turning};
 use crate::real::{Ordered, Real};
 use crate::spatial::{Mat3, Motion, Pose, Twist, Vec3};
 use crate::status::Status;
@@ -84,19 +84,31 @@ pub(super) fn read_pose(mech: &Mechanism, poses: &[f64], i: usize) -> (Pose<f64>
 /// Whether every leg has a direction and a frame: no length of zero, no axis of a universal joint (or rod) along it.
 #[inline(always)]
 pub(super) fn with_legs<V: Lanes>(mech: &Mechanism, pose: &Pose<V>, mut codes: Codes<V>) -> Codes<V> {
-    let least = LEG_TOLERANCE * mech.characteristic_length;
     for leg in &mech.legs {
-        let (_, r) = leg::vectors(leg, pose);
-        let square = r.dot(r);
-        codes = codes.unless(square.greater(V::lit(least * least)), Status::Singular);
-        if let Turning::Across(..) = leg.turning {
-            let (u, _) = leg::turning_axis(leg.turning, pose);
-            let across = u.cross(r);
-            let sine = across.dot(across);
-            codes = codes.unless(sine.greater(square.scale(LEG_TOLERANCE * LEG_TOLERANCE)), Status::Singular);
-        }
+        let p = leg::position(leg, pose);
+        let normal = leg::normal(leg, pose, &p);
+        codes = with_leg(mech, leg, p.length, normal.dot(normal), codes);
     }
     codes
+}
+
+/// The same of one leg, from its length and |N|² \[T5\].
+#[inline(always)]
+pub(super) fn with_leg<V: Lanes>(
+    mech: &Mechanism,
+    leg: &Leg,
+    length: V,
+    normal: V,
+    codes: Codes<V>,
+) -> Codes<V> {
+    let codes =
+        codes.unless(length.greater(V::lit(LEG_TOLERANCE * mech.characteristic_length)), Status::Singular);
+    match leg.turning {
+        Turning::Across(..) => {
+            codes.unless(normal.greater(V::lit(LEG_TOLERANCE * LEG_TOLERANCE)), Status::Singular)
+        }
+        Turning::Along(..) | Turning::Free(_) => codes,
+    }
 }
 
 pub(super) fn check_legs(mech: &Mechanism, pose: &Pose<f64>) -> Status {
@@ -180,10 +192,20 @@ pub(super) fn check_finite(values: &[f64]) -> Status {
 
 /// The first limit of a joint that a pose breaks.
 #[inline(always)]
-pub(super) fn within_limits<V: Lanes>(mech: &Mechanism, pose: &Pose<V>, mut codes: Codes<V>) -> Codes<V> {
-    let mut seen = Seen::default();
+pub(super) fn within_limits<V: Lanes>(mech: &Mechanism, pose: &Pose<V>, codes: Codes<V>) -> Codes<V> {
+    within_limits_of(mech, pose, &mut Seen::default(), codes)
+}
+
+/// The same with what has been seen of the legs.
+#[inline(always)]
+pub(super) fn within_limits_of<V: Lanes>(
+    mech: &Mechanism,
+    pose: &Pose<V>,
+    seen: &mut Seen<V>,
+    mut codes: Codes<V>,
+) -> Codes<V> {
     for limit in joint_limits(mech) {
-        let margin = limit.bound.margin(limit.of_joint(mech, pose, &mut seen));
+        let margin = limit.bound.margin(limit.of_joint(mech, pose, seen));
         codes = codes.unless(V::zero().at_most(margin), limit.status());
     }
     codes

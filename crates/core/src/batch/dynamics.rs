@@ -1,11 +1,15 @@
 //! Dynamics of many states.
 
 use super::block::{self, Answers, At, Codes, Operation, Pieces};
-use super::checks::{check_finite, limit_status, outcome, read_pose, solved, then, within_limits};
+use super::checks::{
+    check_finite, finite, limit_status, outcome, read_pose, solved, then, with_leg, with_motion,
+    within_limits_of,
+};
 use super::{FieldId, States, Table};
-use crate::dynamics;
+use crate::dynamics::{self, Balance};
 use crate::lanes::Lanes;
 use crate::leg;
+use crate::limits::Seen;
 use crate::mechanism::Mechanism;
 use crate::mobility;
 use crate::real::Dual;
@@ -57,13 +61,26 @@ impl Operation<2> for InverseDynamics<'_> {
     #[inline(always)]
     fn run<V: Lanes>(&self, at: At, answers: &mut Answers<'_, 2>) -> Codes<V> {
         let (mech, [forces, multipliers]) = (self.mech, Answers::fields());
-        let (platform, load, codes) = self.states.loaded_at(mech, self.loads, at);
-        let (f, pivots) = dynamics::inverse_dynamics(mech, &platform, load);
+        let (platform, codes) = self.states.platform(at);
+        let (pose, load) = (&platform.pose, self.loads.of(mech, &platform.pose, at));
+        let mut balance = Balance::new(mech, &platform, load);
+        let (mut legs, mut seen) = (Codes::ok(), Seen::default());
+        for (k, leg) in mech.legs.iter().enumerate() {
+            let place = leg::place(leg, pose);
+            let (p, f) = &place;
+            legs = with_leg(mech, leg, p.length, f.sine * f.sine, legs);
+            seen.next(p);
+            balance.add(mech, k, leg, &place, &platform);
+        }
+        let (f, pivots) = balance.solved(mech, pose);
+        let codes = codes
+            .then(with_motion(mech, &platform, legs))
+            .unless(finite(&load.array()), Status::InvalidInput);
         put_forces(mech, answers, forces, &f);
         for k in 0..mech.independent.len() {
             answers.put(multipliers, k, [f[mech.dof() + k]]);
         }
-        within_limits(mech, &platform.pose, solved(mech, &f, pivots, codes))
+        within_limits_of(mech, pose, &mut seen, solved(mech, &f, pivots, codes))
     }
 }
 

@@ -1,12 +1,15 @@
 //! Kinematics of many states.
 
 use super::block::{self, Answers, At, Codes, Operation};
-use super::checks::{actuated, any_pose, finite, pose_at, solved, with_twist, within_limits};
+use super::checks::{
+    actuated, any_pose, finite, kept, pose_at, solved, with_leg, with_motion, with_twist, within_limits_of,
+};
 use super::{States, Table};
 use crate::jacobian;
 use crate::joints::{self, Zero};
 use crate::lanes::Lanes;
 use crate::leg;
+use crate::limits::Seen;
 use crate::mechanism::Mechanism;
 use crate::spatial::{Twist, Vec3};
 use crate::status::Status;
@@ -28,14 +31,18 @@ impl Operation<3> for InverseKinematics<'_> {
     #[inline(always)]
     fn run<V: Lanes>(&self, at: At, answers: &mut Answers<'_, 3>) -> Codes<V> {
         let (mech, [lengths, vectors, directions]) = (self.mech, Answers::fields());
-        let (pose, codes) = pose_at(mech, self.poses, at);
+        let (pose, mut codes) = any_pose(self.poses, at);
+        let mut seen = Seen::default();
         for (k, leg) in mech.legs.iter().enumerate() {
             let p = leg::position(leg, &pose);
+            let normal = leg::normal(leg, &pose, &p);
+            codes = with_leg(mech, leg, p.length, normal.dot(normal), codes);
+            seen.next(&p);
             answers.put(lengths, k, [p.length]);
             answers.put(vectors, k, p.r.array());
             answers.put(directions, k, p.delta.array());
         }
-        within_limits(mech, &pose, codes)
+        within_limits_of(mech, &pose, &mut seen, kept(mech, &pose, codes))
     }
 }
 
@@ -131,10 +138,13 @@ impl Operation<21> for Kinematics<'_> {
     #[inline(always)]
     fn run<V: Lanes>(&self, at: At, answers: &mut Answers<'_, 21>) -> Codes<V> {
         let mech = self.mech;
-        let (platform, codes) = self.states.at(mech, at);
+        let (platform, codes) = self.states.platform(at);
+        let (mut legs, mut seen) = (Codes::ok(), Seen::default());
         for (k, (leg, zero)) in mech.legs.iter().zip(self.zeros).enumerate() {
             let state = leg::state(leg, &platform);
             let leg::State { position: p, end, turn, frame } = &state;
+            legs = with_leg(mech, leg, p.length, frame.sine * frame.sine, legs);
+            seen.next(p);
             let (piston, cylinder) = (leg::piston(leg, &state), leg::cylinder(leg, &state));
             let [below, above] = joints::angles(leg, zero, &platform, &state);
             let [
@@ -185,7 +195,8 @@ impl Operation<21> for Kinematics<'_> {
                 answers.put(rod_eps, r, (axis * turn.acceleration).array());
             }
         }
-        within_limits(mech, &platform.pose, codes)
+        let codes = codes.then(with_motion(mech, &platform, legs));
+        within_limits_of(mech, &platform.pose, &mut seen, codes)
     }
 }
 

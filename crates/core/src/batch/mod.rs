@@ -81,14 +81,21 @@ impl States<'_> {
         self.poses.is_empty()
     }
 
-    /// The states, and whether they are ones that the mechanism can be in.
+    /// The states, and whether their poses are poses at all.
     #[inline(always)]
-    fn at<V: Lanes>(&self, mech: &Mechanism, at: At) -> (Motion<V>, Codes<V>) {
+    fn platform<V: Lanes>(&self, at: At) -> (Motion<V>, Codes<V>) {
         let (pose, codes) = any_pose(self.poses, at);
         let twist = Twist::from_array(at.read_or_zero(self.twists));
         let acceleration = Acceleration::from_array(at.read_or_zero(self.accelerations));
-        let platform = Motion { pose, twist, acceleration };
-        (platform, with_motion(mech, &platform, with_legs(mech, &pose, codes)))
+        (Motion { pose, twist, acceleration }, codes)
+    }
+
+    /// The states, and whether they are ones that the mechanism can be in.
+    #[inline(always)]
+    fn at<V: Lanes>(&self, mech: &Mechanism, at: At) -> (Motion<V>, Codes<V>) {
+        let (platform, codes) = self.platform(at);
+        let codes = with_legs(mech, &platform.pose, codes);
+        (platform, with_motion(mech, &platform, codes))
     }
 
     /// The same with the load at them.
