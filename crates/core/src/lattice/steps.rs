@@ -6,7 +6,7 @@ use crate::forward_lanes::{
     ARRIVED, BEGINNING, GOING, Newton, Piece, Pieces, Poses, get, load, newton, put, store,
 };
 use crate::lanes::{self, Lanes, Row, Task, WIDTH};
-use crate::limits::Limit;
+use crate::limits::{Limit, Seen};
 use crate::linear::solve_all;
 use crate::mechanism::Mechanism;
 use crate::reach::{ON_LIMIT, margins};
@@ -59,9 +59,10 @@ impl Room<'_> {
             inside = V::select(V::lit(low).at_most(o[k]), inside, V::zero());
             inside = V::select(o[k].at_most(V::lit(high)), inside, V::zero());
         }
+        let mut seen = Seen::default();
         for limit in &self.mech.limits {
             if is_of_joint(limit) {
-                let margin = limit.bound.margin(limit.of_joint(self.mech, pose));
+                let margin = limit.bound.margin(limit.of_joint(self.mech, pose, &mut seen));
                 inside = V::select(V::lit(-ON_LIMIT).at_most(margin), inside, V::zero());
             }
         }
