@@ -1173,7 +1173,9 @@ class Mechanism:
         if shapes.count(shape) == len(shapes):
             return shape, [np.ascontiguousarray(array) for array in arrays]
         shape = _broadcast(*shapes)
-        return shape, [_spread(a, shape, core) for a, (_, core) in zip(arrays, arguments.values(), strict=True)]
+        return shape, [
+            _spread(a, shape, core) for a, (_, core) in zip(arrays, arguments.values(), strict=True)
+        ]
 
 
 def _plain(value: Any) -> Any:

@@ -340,9 +340,10 @@ fn turn_xyz<T: Real>([(s1, c1), (s2, c2), (s3, c3)]: [(T, T); 3]) -> Mat3<T> {
 fn turn_about<T: Trig>(axis: Vec3<f64>, angle: T) -> Mat3<T> {
     let (s, c) = angle.sin_cos();
     let mut columns = Mat3::identity().0;
-    for (column, e) in columns.iter_mut().zip([Vec3::X, Vec3::Y, Vec3::Z]) {
-        let along = axis * axis.dot(e);
-        *column = Vec3::lift(along) + Vec3::lift(e - along) * c + Vec3::lift(axis.cross(e)) * s;
+    let axes = [Vec3::X, Vec3::Y, Vec3::Z];
+    for k in 0..3 {
+        let (e, along) = (axes[k], axis * axis.dot(axes[k]));
+        columns[k] = Vec3::lift(along) + Vec3::lift(e - along) * c + Vec3::lift(axis.cross(e)) * s;
     }
     Mat3(columns)
 }

@@ -256,11 +256,9 @@ impl<T: Real> Seen<T> {
 fn smallest<V: Lanes>(mech: &Mechanism, pose: &Pose<V>) -> V {
     let [x, y, z] = pose.rotation.0;
     let mut rows = [[0.0; WIDTH]; 12];
-    for (k, part) in [x, y, z, pose.o].into_iter().enumerate() {
-        let [a, b, c] = part.array();
-        a.store(&mut rows[3 * k]);
-        b.store(&mut rows[3 * k + 1]);
-        c.store(&mut rows[3 * k + 2]);
+    let columns = [x.array(), y.array(), z.array(), pose.o.array()];
+    for k in 0..12 {
+        columns[k / 3][k % 3].store(&mut rows[k]);
     }
     V::load(&smallest_of_each(mech, &rows, V::WIDTH))
 }

@@ -137,10 +137,10 @@ impl Operation<6> for FromCoordinates<'_> {
         let (ok, fold) = (codes.are(Status::Ok), codes.are(Status::Fold));
         let mut matrix = [V::zero(); 16];
         matrix[15] = V::one();
-        for (j, column) in [x, y, z, platform.pose.o].into_iter().enumerate() {
-            let column = column.array();
-            for i in 0..3 {
-                matrix[4 * i + j] = column[i];
+        let columns = [x.array(), y.array(), z.array(), platform.pose.o.array()];
+        for i in 0..3 {
+            for j in 0..4 {
+                matrix[4 * i + j] = columns[j][i];
             }
         }
         for i in 0..16 {
