@@ -168,12 +168,13 @@ impl Slab {
         Slab { first, last: vec![NONE; nodes], known: vec![], awaited: vec![false; nodes] }
     }
 
-    /// The first of the poses known at a node whose marker is within a distance of a place.
+    /// The last of the poses known at a node whose marker is within a distance of a place.
     fn find(&self, node: usize, place: [f32; 3], within: f32) -> Option<usize> {
         let mut at = self.last[node - self.first];
         while let Some(known) = self.known.get(at as usize) {
             let [x, y, z] = std::array::from_fn(|k| known.marker[k] - place[k]);
-            if x * x + y * y + z * z <= within * within {
+            // An infinite distance is none.
+            if x * x + y * y + z * z < within * within {
                 return Some(at as usize);
             }
             at = known.next;
@@ -194,6 +195,13 @@ impl Front {
         self.nodes.push(node);
         self.poses.push(pose);
         self.came.push(came);
+    }
+
+    /// Notes the direction from which a step has led to one of the poses, if it has.
+    fn note(&mut self, pose: Option<usize>, direction: u16) {
+        if let Some(i) = pose {
+            self.came[i] |= direction;
+        }
     }
 
     /// The same poses in the order of their nodes.
@@ -380,9 +388,7 @@ impl Lattice {
             let mut made = Vec::new();
             waiting.retain(|step| {
                 if let Some(known) = slab.find(step.node, step.marker, step.within) {
-                    if known >= known_before {
-                        front.came[known - known_before] |= step.back();
-                    }
+                    front.note(known.checked_sub(known_before), step.back());
                     return false;
                 }
                 let awaited = &mut slab.awaited[step.node - slab.first];
@@ -400,9 +406,7 @@ impl Lattice {
                 Met::Pose(pose) => {
                     let (step, marker) = (&made[i], short(marker(mech, &pose)));
                     if let Some(known) = slab.find(step.node, marker, same) {
-                        if known >= known_before {
-                            front.came[known - known_before] |= step.back();
-                        }
+                        front.note(known.checked_sub(known_before), step.back());
                         return;
                     }
                     reached.inside += u64::from(slab.last[step.node - slab.first] == NONE);
