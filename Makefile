@@ -11,6 +11,9 @@ export PYO3_PYTHON := $(CURDIR)/$(BIN)/python
 unexport CONDA_PREFIX PYTHONHOME PYTHONPATH
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
+# The other kind of processor whose registers are used.
+ARM := aarch64-unknown-linux-gnu
+
 # On CI the locked crates and no others.
 LOCKED := $(if $(CI),--locked)
 
@@ -46,6 +49,9 @@ lint: $(BUILT) ## formatting, style and types of both languages
 	$(BIN)/python -m mypy.stubtest --mypy-config-file pyproject.toml polypod._core
 	cargo fmt --all --check
 	cargo clippy $(LOCKED) --workspace --all-targets -- -D warnings
+	@if [ -d "$$(rustc --print target-libdir --target $(ARM))" ]; \
+	then echo "cargo clippy --target $(ARM)"; cargo clippy $(LOCKED) --target $(ARM) -p polypod-core -- -D warnings; \
+	else echo "registers of $(ARM): not compiled, rustup target add $(ARM)"; fi
 
 bench: $(BUILT) ## measure the speed from Rust and from Python
 	cargo bench $(LOCKED) -p polypod-core

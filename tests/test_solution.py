@@ -72,7 +72,7 @@ def test_built_in_motion_is_what_its_file_says(built_in: xr.Dataset) -> None:
 
 
 def test_built_in_motion_is_solved_as_each_of_its_states(built_in: xr.Dataset) -> None:
-    state = LU.state(MOTION.coordinates, MOTION.rates, MOTION.second_rates)
+    state = LU.state(MOTION.coordinates, MOTION.rates, MOTION.second_rates, continued=True)
     kinematics = LU.kinematics(state.pose, state.twist, state.acceleration)
     dynamics = LU.inverse_dynamics(state.pose, state.twist, state.acceleration)
     coupled = LU.coupled_forces(state.pose, dynamics.constraint)

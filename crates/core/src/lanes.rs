@@ -457,7 +457,7 @@ mod arm {
     use std::ops::{Add, Div, Mul, Neg, Sub};
 
     use super::Lanes;
-    use crate::real::{Ordered, Real};
+    use crate::real::Real;
 
     register! {
         /// NEON, which every aarch64 has.

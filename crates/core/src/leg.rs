@@ -170,18 +170,17 @@ pub fn turn<T: Real>(
 ) -> Turn<T> {
     let ([a, b], [a1, b1]) = (end.delta_rate, end.delta_acceleration);
     let (spin, spin_rate) = match leg.turning {
-        Turning::Free(_) => (T::zero(), T::zero()),
-        Turning::Across(Side::Base, _) | Turning::Along(Side::Base, _) => spin(f.slope, a, b, a1),
         Turning::Across(Side::Platform, _) | Turning::Along(Side::Platform, _) => {
             let omega = f.axes.transpose_mul(platform.twist.omega);
             let eps = f.axes.transpose_mul(platform.acceleration.eps);
             // As the platform sees it: δ' - ω×δ, and δ'' - ε×δ - ω×(ω×δ) - 2ω×(δ' - ω×δ) along n
             let (a, b) = (a + omega.z, b - omega.x);
             let a1 = a1 + eps.z - omega.y * (omega.x + b + b);
-            let (s, s1) = spin(f.slope, a, b, a1);
+            let (s, s1) = spin(leg.turning, f.slope, a, b, a1);
             // The platform's turn about δ, and its rate, come on top.
             (omega.y + s, eps.y + omega.x.mul_add(a, omega.z * b) + s1)
         }
+        _ => spin(leg.turning, f.slope, a, b, a1),
     };
     // [T6] ω = δ×δ' + sδ;  ε = δ×δ'' + s'δ + sδ'
     Turn {
@@ -192,11 +191,17 @@ pub fn turn<T: Real>(
     }
 }
 
-/// [T6] `s = κa`, `s' = κ(a₁ - 2bs) - ab` for δ' = (a, b) and δ'' = (a₁, ·) along n and m, seen from the body of u.
+/// [T6] `s = κa`, `s' = κ(a₁ - 2bs) - ab` for δ' = (a, b) and δ'' = (a₁, ·) along n and m, seen from the body of u; an R
+/// or F joint, where a = 0, lets nothing spin.
 #[inline(always)]
-fn spin<T: Real>(slope: T, a: T, b: T, a1: T) -> (T, T) {
-    let s = slope * a;
-    (s, slope * (a1 - (b + b) * s) - a * b)
+fn spin<T: Real>(turning: Turning<impl Constant<T>>, slope: T, a: T, b: T, a1: T) -> (T, T) {
+    match turning {
+        Turning::Across(..) => {
+            let s = slope * a;
+            (s, slope * (a1 - (b + b) * s) - a * b)
+        }
+        Turning::Along(..) | Turning::Free(_) => (T::zero(), T::zero()),
+    }
 }
 
 /// All of a leg at an instant.

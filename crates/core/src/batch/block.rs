@@ -71,6 +71,11 @@ impl<V: Lanes> Codes<V> {
         Codes(-self.0.abs())
     }
 
+    #[inline(always)]
+    pub(super) fn store(self, to: &mut [f64]) {
+        self.0.store(to);
+    }
+
     /// Where the status is this one.
     #[inline(always)]
     pub(super) fn are(self, status: Status) -> V::Mask {
@@ -79,7 +84,7 @@ impl<V: Lanes> Codes<V> {
 }
 
 /// The status that a code is, and whether there are numbers with it.
-fn read(code: f64) -> (Status, bool) {
+pub(super) fn read(code: f64) -> (Status, bool) {
     let status = Status::ALL[code.abs() as usize];
     (status, code < 0.0 || status.stands())
 }

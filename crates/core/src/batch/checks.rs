@@ -1,9 +1,9 @@
 //! Whether a state is one that the mechanism can be in: the checks that every operation makes of its input.
 
-use super::block::{At, Codes};
+use super::block::{self, At, Codes};
 use crate::constraint;
 use crate::forward_dynamics::square;
-use crate::lanes::Lanes;
+use crate::lanes::{self, Lanes, Row, Task, WIDTH};
 use crate::leg;
 use crate::limits::{Limit, Seen};
 use crate::mechanism::{Constraint, Leg, Mechanism, Turning};
@@ -211,8 +211,24 @@ pub(super) fn within_limits_of<V: Lanes>(
     codes
 }
 
+/// The same of one pose, in the registers of batches: lengths at the very end of a stroke are judged alike everywhere.
 pub(super) fn limit_status(mech: &Mechanism, pose: &Pose<f64>) -> Status {
-    within_limits(mech, pose, Codes::ok()).status()
+    let mut codes = [0.0; WIDTH];
+    lanes::dispatch(LimitsOfOne { mech, pose, codes: &mut codes });
+    block::read(codes[0]).0
+}
+
+struct LimitsOfOne<'a> {
+    mech: &'a Mechanism,
+    pose: &'a Pose<f64>,
+    codes: &'a mut Row,
+}
+
+impl Task for LimitsOfOne<'_> {
+    #[inline(always)]
+    fn run<V: Lanes>(self) {
+        within_limits::<V>(self.mech, &Pose::lift(self.pose), Codes::ok()).store(self.codes);
+    }
 }
 
 /// The limits of joints, which come first in the list.
