@@ -477,7 +477,8 @@ def residuals(spec, pose) -> Jet:
 
     In the leg's frame (n, δ, w): a universal joint's two axes stay square (u·n = 0), a revolute joint's axis
     is n (u·δ = u·w = 0), a fixed joint keeps direction and normal (d·n = d·w = n'·w = 0). Of the joint that n
-    was made from, what holds anyway is left out. Legs on one rod keep the angle between their normals.
+    was made from, what holds anyway is left out. Legs on one rod keep the angle between their normals, that
+    of the home pose, or of the mechanism `spec["tied"]` at its home pose.
     """
     R, o = jet(pose[0]), jet(pose[1])
     legs = legs_at(spec, (R, o))
@@ -500,9 +501,10 @@ def residuals(spec, pose) -> Jet:
         carried = [i for i, leg in enumerate(spec["legs"]) if leg["base"]["rod"] == k]
         frame = rod_frame(spec, k, legs)
         for i in carried[1:]:
-            at_home = [leg_at(spec, spec["legs"][m], home(spec)) for m in (carried[0], i)]
-            kept = rod_frame(spec, k, {carried[0]: at_home[0]}).x.T @ at_home[1].n.x
-            parts.append(dot(at_home[1].base_axis, cross(apply(frame, kept), legs[i].n)))
+            tied = spec.get("tied", spec)
+            at_home = [leg_at(tied, tied["legs"][m], home(tied)) for m in (carried[0], i)]
+            kept = rod_frame(tied, k, {carried[0]: at_home[0]}).x.T @ at_home[1].n.x
+            parts.append(dot(legs[i].base_axis, cross(apply(frame, kept), legs[i].n)))
     return concat(parts)
 
 

@@ -36,7 +36,7 @@ EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
 PYTHON_SOURCES = sorted((ROOT / "python").rglob("*.py"))
 RUST_SOURCES = sorted((ROOT / "crates").rglob("*.rs"))
 DOCTEST_FLAGS = doctest.NORMALIZE_WHITESPACE | doctest.ELLIPSIS
-OPTIONAL = {"pinocchio", "trimesh", "viser"}  # packages of the extras, which some modules need
+OPTIONAL = {"exudyn", "mujoco", "pinocchio", "trimesh", "viser"}  # of the extras; some modules need them
 LAST_EQUATION = 44
 
 

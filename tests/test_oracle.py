@@ -233,6 +233,8 @@ DRAWN = {
     "rod-of-one": (["rRPU", "UPS", "SPU", "UPS", "SPS"], ""),
     "rod-lined": (["UPS", "rRPU", "SPU", "rRPU", "SPS"], "lined"),
 }
+# Its legs on one rod tie the platform by a constraint of their own, kind E.
+TIED = {"rod-of-two": (["UPS", "rRPU", "SPU-", "rRPU"], "")}
 FILES = ("stewart-gough", "3-rps")
 
 
@@ -296,7 +298,8 @@ def case(name) -> Case:
     if name in FILES:
         tables = tomllib.loads((DATA / f"{name}.toml").read_text())
     else:
-        tables = draw(name, *(DRAWN[name][:1]), rng, DRAWN[name][1])
+        kinds, variant = {**DRAWN, **TIED}[name]
+        tables = draw(name, kinds, rng, variant)
     spec = o.read(tables)
     pose = sample(spec, rng)
     if name in FILES:

@@ -8,7 +8,7 @@ files and from 0 in arrays.
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from polypod import errors
+from polypod import compute, errors
 from polypod._core import __version__
 from polypod.errors import (
     CoordinateError,
@@ -33,6 +33,8 @@ if TYPE_CHECKING:
     from polypod.results import Solution, load_solution
     from polypod.solution import solve
     from polypod.workspace import Workspace, load_workspace
+
+compute.configure()
 
 # Motions and results need scipy and xarray, which take their time to load: only who uses them waits for them.
 _LATER = {

@@ -23,7 +23,7 @@ def verify(
     ],
     engine: Annotated[
         list[str] | None,
-        typer.Option(metavar="NAME", help="Engine to compare with, by default pinocchio; repeatable."),
+        typer.Option(metavar="NAME", help="Engine: pinocchio (the default), exudyn, mujoco; repeatable."),
     ] = None,
     tolerance: Annotated[
         float | None,
@@ -35,6 +35,12 @@ def verify(
             min=2, metavar="N", help="Compare at N instants evenly over the motion instead of at its own."
         ),
     ] = None,
+    integration: Annotated[
+        bool,
+        typer.Option(
+            "--integrate", help="Also apply the forces in Exudyn over time, with steps that are halved."
+        ),
+    ] = False,
     as_json: JsonOption = False,
 ) -> None:
     """Compare all quantities along a motion with other engines, which know the mechanism file alone.
@@ -45,27 +51,33 @@ def verify(
 
     from polypod.mechanism import load
     from polypod.motion import load_motion
-    from polypod.verify import TOLERANCE
+    from polypod.verify import TOLERANCE, integrate
     from polypod.verify import verify as verify_motion
 
     mech = load(mechanism)
     path = load_motion(motion, mech)
+    compared = path
     if samples is not None:
-        path = path.sample(np.linspace(path.time[0], path.time[-1], samples))
-    with _bar("comparing", len(path.time)) as progress:
+        compared = path.sample(np.linspace(path.time[0], path.time[-1], samples))
+    with _bar("comparing", len(compared.time)) as progress:
         found = verify_motion(
             mech,
-            path,
+            compared,
             engine or ("pinocchio",),
             TOLERANCE if tolerance is None else tolerance,
             progress=progress,
         )
     facts = found.facts()
+    if integration:
+        with _bar("integrating", 1) as progress:
+            followed = integrate(mech, path, progress=progress)
+        facts["integration"] = followed.facts()
+        facts["agrees"] = found.agrees and followed.agrees
     if as_json:
         _print_json(facts)
     else:
         _print_verification(_console(), facts)
-    if not found.agrees:
+    if not facts["agrees"]:
         raise typer.Exit(1)
 
 
@@ -85,7 +97,7 @@ def _print_verification(out: Console, facts: dict[str, Any]) -> None:
             errors = (row[key] for key in ("max", "rms", "relative_max", "relative_rms"))
             time, part = row["worst"]["time"], row["worst"]["part"]
             table.add_row(
-                row["title"],
+                "≈ " * row["approximate"] + row["title"],
                 escape(row["unit"]),
                 *(_g(error, 2) for error in errors),
                 _g(time),
@@ -95,4 +107,23 @@ def _print_verification(out: Console, facts: dict[str, Any]) -> None:
         out.print(table)
         colour = "green" if engine["agrees"] else "red"
         out.print(f"[bold {colour}]{escape(verdict(facts, engine))}[/bold {colour}]")
+        for note in engine["notes"]:
+            out.print(escape(note), highlight=False)
+    if "integration" in facts:
+        _print_integration(out, facts["integration"])
     out.print(f"Relative errors are relative to {facts['relative_to']}.")
+
+
+def _print_integration(out: Console, facts: dict[str, Any]) -> None:
+    from polypod.verify.report import integration_verdict
+
+    headers = ("position / m>", "rotation / rad>", "legs / m>", "order>")
+    table = _table("The motion under the forces, by step", "step / s>", *headers)
+    table.box, table.pad_edge = None, False
+    for row in facts["steps"]:
+        errors = (row["errors"][key] for key in ("position", "rotation", "lengths"))
+        order = "" if row["order"] is None else f"{row['order']:.2f}"
+        table.add_row(_g(row["step"]), *(_g(error, 2) for error in errors), order)
+    out.print(table)
+    colour = "green" if facts["agrees"] else "red"
+    out.print(f"[bold {colour}]{escape(integration_verdict(facts))}[/bold {colour}]")

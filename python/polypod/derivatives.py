@@ -22,6 +22,12 @@ class InverseDynamicsDerivatives(NamedTuple):
     acceleration keep. On a mechanism with constraints only changes that keep them have a meaning: of pose,
     twist and acceleration together. Those by coordinates keep them. Forces are in N (multipliers of kind D:
     N m); each derivative is in that unit by the unit of what is varied.
+
+    By geometry the load, the home pose, and the coordinates with their rates and second rates are kept, and
+    dependent coordinates follow. Where constraints are redundant (legs on one rod) the independent ones alone
+    are used: the others are taken to stay compatible. One number changed by itself, such as one joint's point
+    off the line of its rod, would lock or strain such a mechanism. There, and for the two axes of an F joint,
+    which must stay square, sums over changes that fit have a meaning, single columns none.
     """
 
     coordinates: tuple[str, ...]
@@ -29,6 +35,10 @@ class InverseDynamicsDerivatives(NamedTuple):
     bodies: tuple[str, ...]
     """Names of the p numbers of the bodies, such as "piston 1 center_y": in the axes of the link, inertia
     about the mass centre. Where a leg spins freely only those of a body symmetric about it."""
+    geometry: tuple[str, ...]
+    """Names of the g numbers of points and axes, such as "leg 1 base point_x" or "rod L axis_z", in the axes
+    of the body, base or platform. Axes stay unit vectors: a change along the axis is none. Legs on a rod have
+    its axis."""
     forces_by_pose: Array
     """(..., n, 6), N/m and N/rad."""
     constraint_by_pose: Array
@@ -57,6 +67,13 @@ class InverseDynamicsDerivatives(NamedTuple):
     """(..., n, p), N/kg, N/m and N/(kg m^2)."""
     constraint_by_bodies: Array
     """(..., k, p)."""
+    forces_by_geometry: Array
+    """(..., n, g), N/m for points, N for axes: coordinates, their rates and second rates kept; NaN where the
+    status is FOLD, as are the two below."""
+    constraint_by_geometry: Array
+    """(..., k, g)."""
+    lengths_by_geometry: Array
+    """(..., n, g), of all legs, m/m and m; with six freedoms the pose is kept."""
     status: Codes
     """FOLD where the coordinates do not determine the motion: all other derivatives stand."""
 

@@ -76,12 +76,15 @@ class UnsupportedError(PolypodError):
 class MissingEngineError(PolypodError):
     """An engine of `polypod.verify` that is not installed."""
 
-    def __init__(self, engine: str) -> None:
-        self.engine = engine
-        super().__init__(engine)
+    def __init__(self, engine: str, package: str) -> None:
+        self.engine, self.package = engine, package
+        super().__init__(engine, package)
 
     def __str__(self) -> str:
-        return f"{self.engine} is not installed; install it with: pip install polypod[verify]"
+        return (
+            f"{self.engine} is not installed; install it with: pip install {self.package}, "
+            "or all engines with: pip install polypod[verify]"
+        )
 
 
 class ShapeError(PolypodError):

@@ -962,7 +962,8 @@ class Mechanism:
         """Exact derivatives of the active forces and multipliers of `inverse_dynamics` [T56, T57].
 
         By pose, twist and acceleration; by coordinates, their rates and second rates; by mass, mass centre
-        and inertia of every link. Of dual numbers: no differences are taken.
+        and inertia of every link; by points and axes of joints and rods, lengths too. Of dual numbers: no
+        differences are taken.
 
         Args:
             pose: (..., 4, 4).
@@ -991,7 +992,9 @@ class Mechanism:
         args = (*args, set, named)
         names, table = _core.inverse_dynamics_derivatives(self._core, *args)
         _, bodies, _ = _core.inertial_parameters(self._core)
-        return InverseDynamicsDerivatives(tuple(names), tuple(bodies), **_shaped(table, shape))
+        geometry = _core.geometry_parameters(self._core)
+        arrays = _shaped(table, shape)
+        return InverseDynamicsDerivatives(tuple(names), tuple(bodies), tuple(geometry), **arrays)
 
     def regressor(
         self,
@@ -1088,18 +1091,22 @@ class Mechanism:
         >>> limits.names[limits.binding], limits.margins.min().round(4), bool(limits.within)
         ('stroke min of leg 2', np.float64(0.0941), True)
         """
-        rest = np.zeros(6)
-        twist, acceleration = (rest if a is None else a for a in (twist, acceleration))
-        shape, args = self._loaded_states(pose, twist, acceleration, wrench, wrench_axes)
+        if twist is None and acceleration is None:
+            shape, (poses, *load) = self._loaded(wrench, wrench_axes, pose=(pose, (4, 4)))
+            args: tuple[Any, ...] = (poses, np.empty(0), np.empty(0), *load)
+        else:
+            rest = np.zeros(6)
+            twist, acceleration = (rest if a is None else a for a in (twist, acceleration))
+            shape, args = self._loaded_states(pose, twist, acceleration, wrench, wrench_axes)
         out = _shaped(self._core.limits(*args), shape)
-        margins, binding, status = out["margins"], out["binding"], out["status"]
+        binding = out["binding"]
         return Limits(
             tuple(limit.name for limit in self.limit_list),
-            margins,
+            out["margins"],
             out["relative"],
             np.where(np.isnan(binding), -1, binding).astype(np.int64),
-            (margins >= 0.0).all(axis=-1) & np.isin(status, [s for s in Status if s.has_answer]),
-            status,
+            out["within"] == 1.0,
+            out["status"],
         )
 
     def coupled_forces(
@@ -1156,9 +1163,11 @@ class Mechanism:
     @staticmethod
     def _batch(**arguments: tuple[ArrayLike, tuple[int, ...]]) -> tuple[tuple[int, ...], list[Array]]:
         """The common leading shape of arrays with the given trailing shapes, and the arrays spread to it."""
-        arrays = {name: _array(name, value, core) for name, (value, core) in arguments.items()}
-        shape = _broadcast(*(a.shape[: a.ndim - len(arguments[name][1])] for name, a in arrays.items()))
-        return shape, [_spread(a, shape, arguments[name][1]) for name, a in arrays.items()]
+        arrays = [_array(name, value, core) for name, (value, core) in arguments.items()]
+        cores = [core for _, core in arguments.values()]
+        shapes = [a.shape[: a.ndim - len(core)] for a, core in zip(arrays, cores, strict=True)]
+        shape = _broadcast(*shapes)
+        return shape, [_spread(a, shape, core) for a, core in zip(arrays, cores, strict=True)]
 
 
 def _plain(value: Any) -> Any:
@@ -1206,6 +1215,8 @@ def _array(name: str, value: ArrayLike, core: tuple[int, ...]) -> Array:
 
 
 def _broadcast(*shapes: tuple[int, ...]) -> tuple[int, ...]:
+    if all(shape == shapes[0] for shape in shapes):
+        return shapes[0]  # the plain case, without numpy's delay
     try:
         return np.broadcast_shapes(*shapes)
     except ValueError:
@@ -1214,11 +1225,14 @@ def _broadcast(*shapes: tuple[int, ...]) -> tuple[int, ...]:
 
 def _spread(array: Array, shape: tuple[int, ...], core: tuple[int, ...]) -> Array:
     """Flat and contiguous, one row for each state."""
-    return np.ascontiguousarray(np.broadcast_to(array, shape + core)).reshape(-1)
+    whole = shape + core
+    return np.ascontiguousarray(array if array.shape == whole else np.broadcast_to(array, whole)).reshape(-1)
 
 
 def _shaped(table: Mapping[str, NDArray[Any]], shape: tuple[int, ...]) -> dict[str, NDArray[Any]]:
     """The core's arrays with the batch's own leading axes."""
+    if len(shape) == 1:
+        return dict(table)
     return {name: array.reshape(shape + array.shape[1:]) for name, array in table.items()}
 
 

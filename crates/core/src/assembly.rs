@@ -10,6 +10,7 @@ use crate::mechanism::{
     Body, Constraint, ConstraintKind, Joint, Leg, Load, Mechanism, Mobility, Rod, Side, Turning,
 };
 use crate::mobility;
+use crate::real::{Constant, Scalar, Trig};
 use crate::spatial::{Mat3, Pose, Vec3, Wrench};
 use crate::spec::{ANGLE_TOLERANCE, BodySpec, Fault, JointKind, JointSpec, LegSpec, RodSpec, Spec};
 
@@ -52,9 +53,7 @@ fn build(spec: &Spec, home: Pose<f64>) -> Mechanism {
     let rods: Vec<Rod> =
         spec.rods.iter().flatten().enumerate().map(|(i, rod)| make_rod(spec, i, rod)).collect();
     let legs: Vec<Leg> = spec.legs.iter().flatten().map(|leg| make_leg(leg, &rods, &home)).collect();
-    let of_legs = legs.iter().enumerate().flat_map(|(i, leg)| constraint::of_leg(i, leg));
-    let of_rods = rods.iter().enumerate().flat_map(|(i, rod)| constraint::of_rod(&legs, i, rod.axis, &home));
-    let constraints: Vec<Constraint> = of_legs.chain(of_rods).collect();
+    let constraints = constraints(&legs, &rods, &home);
     let reach: f64 = legs.iter().map(|leg| leg.platform.point.dot(leg.platform.point)).sum();
     let mean_square = reach / mobility::count(legs.len());
     // A platform that is a point has no size of its own; the home lengths then set the scale.
@@ -83,6 +82,17 @@ fn build(spec: &Spec, home: Pose<f64>) -> Mechanism {
         mobility: Mobility::default(),
         limits: Vec::new(),
     }
+}
+
+/// All constraints of legs and rods.
+pub(crate) fn constraints<S: Trig + Constant<S>>(
+    legs: &[Leg<S>],
+    rods: &[Rod<S>],
+    home: &Pose<f64>,
+) -> Vec<Constraint<S>> {
+    let of_legs = legs.iter().enumerate().flat_map(|(i, leg)| constraint::of_leg(i, leg));
+    let of_rods = rods.iter().enumerate().flat_map(|(i, rod)| constraint::of_rod(legs, i, rod.axis, home));
+    of_legs.chain(of_rods).collect()
 }
 
 fn check_home(mech: &Mechanism) -> Vec<Fault> {
@@ -296,10 +306,7 @@ fn make_leg(spec: &LegSpec, rods: &[Rod], home: &Pose<f64>) -> Leg {
         base.axis = Some(rods[rod].axis);
     }
     let platform = make_joint(&spec.platform, home.rotation.transpose_mul(delta));
-    let turning = match (turning_of(&base, Side::Base), turning_of(&platform, Side::Platform)) {
-        (Some(turning), _) | (None, Some(turning)) => turning,
-        (None, None) => Turning::Free(delta.perpendicular()),
-    };
+    let turning = turning(&base, &platform).unwrap_or_else(|| Turning::Free(delta.perpendicular()));
     Leg {
         name: spec.name.clone(),
         actuated: spec.actuated,
@@ -324,7 +331,12 @@ fn make_joint(spec: &JointSpec, direction: Vec3<f64>) -> Joint {
     }
 }
 
-fn turning_of(joint: &Joint, side: Side) -> Option<Turning> {
+/// What gives a leg its normal: its joint on the base, else that on the platform; none for S at both ends.
+pub(crate) fn turning<S: Scalar>(base: &Joint<S>, platform: &Joint<S>) -> Option<Turning<S>> {
+    turning_of(base, Side::Base).or_else(|| turning_of(platform, Side::Platform))
+}
+
+fn turning_of<S: Scalar>(joint: &Joint<S>, side: Side) -> Option<Turning<S>> {
     match joint.kind {
         JointKind::Spherical => None,
         JointKind::Universal => joint.axis.map(|u| Turning::Across(side, u)),

@@ -1,14 +1,14 @@
 //! How far apart struts are from each other and from the platform: distances between segments, and between a
 //! segment and a convex body \[T37\]. All are exact, also for parallel, crossing and vanishing segments.
 
-use crate::real::Scalar;
+use crate::real::{Constant, Ordered, Real};
 use crate::spatial::Vec3;
 
 /// From its first point to its second.
 #[derive(Clone, Copy, Debug)]
 pub struct Segment<T>(pub Vec3<T>, pub Vec3<T>);
 
-impl<T: Scalar> Segment<T> {
+impl<T: Real> Segment<T> {
     #[inline(always)]
     fn vector(&self) -> Vec3<T> {
         self.1 - self.0
@@ -24,35 +24,90 @@ impl<T: Scalar> Segment<T> {
     #[must_use]
     #[inline(always)]
     pub fn without(&self, [start, end]: [f64; 2]) -> Self {
+        if start == 0.0 && end == 0.0 {
+            return *self;
+        }
         let length = self.vector().norm();
-        let cut = |stretch: f64| least(share(T::lit(stretch), length), T::lit(0.5));
-        Segment(self.at(cut(start)), self.at(T::one() - cut(end)))
+        let [start, end] = [share(T::lit(start), length), share(T::lit(end), length)];
+        let half = T::lit(0.5);
+        Segment(self.at(least(start, half)), self.at(T::one() - least(end, half)))
     }
 }
 
+/// The lesser one; the first if they cannot be compared.
 #[inline(always)]
-fn least<T: Scalar>(a: T, b: T) -> T {
-    T::select(b.value() < a.value(), b, a)
+fn least<T: Real>(a: T, b: T) -> T {
+    T::select(a.value().greater(b.value()), b, a)
+}
+
+/// A number brought within [0, 1].
+#[inline(always)]
+fn within<T: Real>(t: T) -> T {
+    least(T::select(T::Value::zero().greater(t.value()), T::zero(), t), T::one())
 }
 
 /// A quotient as a share of a segment: within [0, 1], 0 for 0/0.
 #[inline(always)]
-fn share<T: Scalar>(numerator: T, denominator: T) -> T {
-    let t = T::select(denominator.value() > 0.0, numerator / denominator, T::zero());
-    let t = T::select(t.value() < 0.0, T::zero(), t);
-    least(t, T::one())
+fn share<T: Real>(numerator: T, denominator: T) -> T {
+    let positive = denominator.value().greater(T::Value::zero());
+    within(T::select(positive, numerator / denominator, T::zero()))
 }
 
 #[inline(always)]
-fn square<T: Scalar>(a: Vec3<T>) -> T {
+fn square<T: Real>(a: Vec3<T>) -> T {
     a.dot(a)
 }
 
-/// Squared distance of a point from a segment.
+/// A segment with what every distance from it needs.
+#[derive(Clone, Copy, Debug)]
+struct Line<T> {
+    ends: [Vec3<T>; 2],
+    vector: Vec3<T>,
+    square: T,
+    /// 1 / `square`, zero for a segment that vanishes.
+    inverse: T,
+}
+
+impl<T: Real> Line<T> {
+    #[inline(always)]
+    fn of(s: &Segment<T>) -> Self {
+        let vector = s.vector();
+        let square = square(vector);
+        let lasts = square.value().greater(T::Value::lit(f64::MIN_POSITIVE));
+        let inverse = T::select(lasts, T::one() / square, T::zero());
+        Line { ends: [s.0, s.1], vector, square, inverse }
+    }
+
+    #[inline(always)]
+    fn lift(line: &Line<f64>) -> Self {
+        let Line { ends: [start, end], vector, square, inverse } = *line;
+        Line {
+            ends: [Vec3::lift(start), Vec3::lift(end)],
+            vector: Vec3::lift(vector),
+            square: square.lift(),
+            inverse: inverse.lift(),
+        }
+    }
+
+    #[inline(always)]
+    fn at(&self, t: T) -> Vec3<T> {
+        self.ends[0] + self.vector * t
+    }
+
+    /// Squared distance of a point.
+    #[inline(always)]
+    fn to_point(&self, p: Vec3<T>) -> T {
+        square(p - self.at(within((p - self.ends[0]).dot(self.vector) * self.inverse)))
+    }
+}
+
+/// Squared distance from the first segment to the point of the second that is nearest to its line, brought to its ends.
 #[inline(always)]
-fn to_point<T: Scalar>(s: &Segment<T>, p: Vec3<T>) -> T {
-    let u = s.vector();
-    square(p - s.at(share((p - s.0).dot(u), square(u))))
+fn across<T: Real>(a: &Line<T>, b: &Line<T>) -> T {
+    let (u, v, w) = (a.vector, b.vector, a.ends[0] - b.ends[0]);
+    let (uu, uv, vv) = (a.square, u.dot(v), b.square);
+    let inside = share(uv * v.dot(w) - vv * u.dot(w), uu * vv - uv * uv);
+    b.to_point(a.at(inside))
 }
 
 /// Squared distance between two segments.
@@ -61,18 +116,16 @@ fn to_point<T: Scalar>(s: &Segment<T>, p: Vec3<T>) -> T {
 /// derivatives vanish, or at an edge, which is an end of one segment against the other. For parallel segments
 /// the inner point is not determined, but then an edge is as low; any point of the square will do as a candidate.
 #[inline(always)]
-fn squared_distance<T: Scalar>(a: &Segment<T>, b: &Segment<T>) -> T {
-    let ends = least(least(to_point(b, a.0), to_point(b, a.1)), least(to_point(a, b.0), to_point(a, b.1)));
-    let (u, v, w) = (a.vector(), b.vector(), a.0 - b.0);
-    let (uu, uv, vv) = (square(u), u.dot(v), square(v));
-    let inside = share(uv * v.dot(w) - vv * u.dot(w), uu * vv - uv * uv);
-    least(ends, to_point(b, a.at(inside)))
+fn squared_distance<T: Real>(a: &Line<T>, b: &Line<T>) -> T {
+    let from_a = least(b.to_point(a.ends[0]), b.to_point(a.ends[1]));
+    let from_b = least(a.to_point(b.ends[0]), a.to_point(b.ends[1]));
+    least(least(from_a, from_b), across(a, b))
 }
 
 /// Distance between two segments \[T37\].
 #[inline(always)]
-pub fn distance<T: Scalar>(a: &Segment<T>, b: &Segment<T>) -> T {
-    squared_distance(a, b).sqrt()
+pub fn distance<T: Real>(a: &Segment<T>, b: &Segment<T>) -> T {
+    squared_distance(&Line::of(a), &Line::of(b)).sqrt()
 }
 
 /// Relative to the size of the body: what counts as one point, one line, one plane.
@@ -84,6 +137,8 @@ const LINE_TOLERANCE: f64 = 1e-6;
 struct Facet {
     /// In order about the normal.
     corners: Vec<Vec3<f64>>,
+    /// From each corner to the next.
+    edges: Vec<Line<f64>>,
     /// In the plane, square to the edge from each corner to the next, inwards.
     inward: Vec<Vec3<f64>>,
     /// Unit vector, out of the body; zero for a line or a point.
@@ -93,38 +148,56 @@ struct Facet {
 impl Facet {
     fn new(corners: Vec<Vec3<f64>>, normal: Vec3<f64>) -> Self {
         let next = corners.iter().cycle().skip(1);
-        let inward = corners.iter().zip(next).map(|(a, b)| normal.cross(*b - *a)).collect();
-        Facet { corners, inward, normal }
+        let edges: Vec<_> = corners.iter().zip(next).map(|(a, b)| Line::of(&Segment(*a, *b))).collect();
+        let inward = edges.iter().map(|edge| normal.cross(edge.vector)).collect();
+        Facet { corners, edges, inward, normal }
     }
 
     fn is_polygon(&self) -> bool {
         self.corners.len() > 2
     }
 
-    fn height<T: Scalar>(&self, p: Vec3<T>) -> T {
+    #[inline(always)]
+    fn height<T: Real>(&self, p: Vec3<T>) -> T {
         Vec3::lift(self.normal).dot(p - Vec3::lift(self.corners[0]))
     }
 
-    /// Whether the point's foot in the plane is in the polygon.
-    fn is_over<T: Scalar>(&self, p: Vec3<T>) -> bool {
-        let inside = |(corner, inward): (&Vec3<f64>, &Vec3<f64>)| {
-            Vec3::lift(*inward).dot(p - Vec3::lift(*corner)).value() >= 0.0
-        };
-        self.is_polygon() && self.corners.iter().zip(&self.inward).all(inside)
+    /// How far within the nearest side of a polygon the point's foot in the plane is, negative outside; in a unit of
+    /// each side's own.
+    #[inline(always)]
+    fn depth<T: Real>(&self, p: Vec3<T>) -> T::Value {
+        let mut depth = T::Value::lit(f64::INFINITY);
+        for k in 0..self.corners.len() {
+            let inside = Vec3::lift(self.inward[k]).dot(p - Vec3::lift(self.corners[k]));
+            depth = depth.least(inside.value());
+        }
+        depth
     }
 
-    fn squared_distance<T: Scalar>(&self, s: &Segment<T>) -> T {
-        let next = self.corners.iter().cycle().skip(1);
-        let edges = self.corners.iter().zip(next).map(|(a, b)| Segment(Vec3::lift(*a), Vec3::lift(*b)));
-        let mut result = edges.map(|edge| squared_distance(s, &edge)).fold(T::lit(f64::INFINITY), least);
-        let heights = [self.height(s.0), self.height(s.1)];
-        for (p, h) in [s.0, s.1].into_iter().zip(heights) {
-            result = T::select(self.is_over(p), least(result, h * h), result);
+    /// The first number where the point is over the polygon, else the second.
+    #[inline(always)]
+    fn over<T: Real>(&self, p: Vec3<T>, a: T, b: T) -> T {
+        T::select(T::Value::zero().at_most(self.depth(p)), a, b)
+    }
+
+    #[inline(always)]
+    fn squared_distance<T: Real>(&self, s: &Line<T>) -> T {
+        let mut result = T::lit(f64::INFINITY);
+        for edge in &self.edges {
+            let edge = Line::lift(edge);
+            let ends = least(edge.to_point(s.ends[0]), edge.to_point(s.ends[1]));
+            // The end of the edge is the start of another.
+            result = least(least(result, s.to_point(edge.ends[0])), least(ends, across(s, &edge)));
         }
+        if !self.is_polygon() {
+            return result;
+        }
+        let [h0, h1] = [self.height(s.ends[0]), self.height(s.ends[1])];
+        result = self.over(s.ends[0], least(result, h0 * h0), result);
+        result = self.over(s.ends[1], least(result, h1 * h1), result);
         // Ends on both sides of the plane: the segment may pierce the polygon.
-        let [h0, h1] = heights;
-        let crosses = h0.value() * h1.value() < 0.0 && self.is_over(s.at(h0 / (h0 - h1)));
-        T::select(crosses, T::zero(), result)
+        let pierced = self.over(s.at(h0 / (h0 - h1)), T::zero(), result);
+        T::select(T::Value::zero().greater(h0.value() * h1.value()), pierced, result)
     }
 }
 
@@ -152,11 +225,23 @@ impl Hull {
 
     /// Distance of a segment from the body, zero where they meet \[T37\].
     #[must_use]
-    pub fn distance<T: Scalar>(&self, s: &Segment<T>) -> T {
-        let nearest = self.0.iter().map(|f| f.squared_distance(s)).fold(T::lit(f64::INFINITY), least).sqrt();
-        let solid = self.0.len() > 1;
-        let inside = solid && self.0.iter().all(|f| f.height(s.0).value() <= 0.0);
-        T::select(inside, T::zero(), nearest)
+    #[inline(always)]
+    pub fn distance<T: Real>(&self, s: &Segment<T>) -> T {
+        let line = Line::of(s);
+        let mut nearest = T::lit(f64::INFINITY);
+        for facet in &self.0 {
+            nearest = least(nearest, facet.squared_distance(&line));
+        }
+        let nearest = nearest.sqrt();
+        if self.0.len() == 1 {
+            return nearest;
+        }
+        // Within a solid is what no facet has below it.
+        let mut height = T::Value::lit(f64::NEG_INFINITY);
+        for facet in &self.0 {
+            height = height.most(facet.height(s.0).value());
+        }
+        T::select(height.at_most(T::Value::zero()), T::zero(), nearest)
     }
 }
 
@@ -292,7 +377,7 @@ mod tests {
         let Hull(facets) = cube();
         assert_eq!(facets.len(), 6);
         assert!(facets.iter().all(|f| f.corners.len() == 4 && f.height(v(0.5, 0.5, 0.5)) < -0.49));
-        assert!(facets.iter().all(|f| f.is_over(v(0.5, 0.5, 0.5))));
+        assert!(facets.iter().all(|f| f.depth(v(0.5, 0.5, 0.5)) > 0.0));
     }
 
     #[test]

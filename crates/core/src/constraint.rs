@@ -4,19 +4,14 @@
 use crate::leg;
 use crate::mechanism::{Constraint, ConstraintKind, Joint, Leg, Mechanism, Partner};
 use crate::quadratic::{Hessian, add_centripetal, add_mixed, point_columns};
-use crate::real::Real;
+use crate::real::{Constant, Real, Scalar, Trig};
 use crate::spatial::{Mat3, Pose, Vec3, Wrench};
 use crate::spec::{ANGLE_TOLERANCE, JointKind};
 
-const NO_PARTNER: Partner = Partner {
-    base_point: Vec3 { x: 0.0, y: 0.0, z: 0.0 },
-    platform_point: Vec3 { x: 0.0, y: 0.0, z: 0.0 },
-    turn: Mat3([Vec3::X, Vec3::Y, Vec3::Z]),
-};
-
 /// The constraints of one leg, from what its two joints say about its direction δ and its normal n.
 #[must_use]
-pub fn of_leg(index: usize, leg: &Leg) -> Vec<Constraint> {
+pub fn of_leg<S: Scalar>(index: usize, leg: &Leg<S>) -> Vec<Constraint<S>> {
+    let none = Vec3::zero();
     let make = |kind, base_axis, platform_axis| Constraint {
         kind,
         leg: index,
@@ -24,16 +19,15 @@ pub fn of_leg(index: usize, leg: &Leg) -> Vec<Constraint> {
         platform_point: leg.platform.point,
         base_axis,
         platform_axis,
-        partner: NO_PARTNER,
+        partner: Partner { base_point: none, platform_point: none, turn: Mat3::identity() },
     };
-    let none = Vec3::zero();
     // A fixed joint holds δ as well: the leg is square to two axes of the body.
-    let square =
-        |kind: JointKind, axis: Option<Vec3<f64>>, normal: Option<Vec3<f64>>| match (kind, axis, normal) {
-            (JointKind::Revolute, Some(a), _) => vec![a],
-            (JointKind::Fixed, Some(d), Some(n)) => vec![n, n.cross(d)],
-            _ => vec![],
-        };
+    let square = |kind: JointKind, axis: Option<Vec3<S>>, normal: Option<Vec3<S>>| match (kind, axis, normal)
+    {
+        (JointKind::Revolute, Some(a), _) => vec![a],
+        (JointKind::Fixed, Some(d), Some(n)) => vec![n, n.cross(d)],
+        _ => vec![],
+    };
     let below = square(leg.base.kind, leg.base.axis, leg.base.normal);
     let above = square(leg.platform.kind, leg.platform.axis, leg.platform.normal);
     let b = below.iter().map(|&a| make(ConstraintKind::B, a, none));
@@ -48,11 +42,11 @@ pub fn of_leg(index: usize, leg: &Leg) -> Vec<Constraint> {
         (Some(Normal::Along(n)), Some(Normal::Along(m))) => {
             // n and m are one line: n is square to the two directions that are square to m. With δ held on both
             // sides one more relation keeps the platform from turning about n.
-            let two = |axis: Vec3<f64>, direction: Option<Vec3<f64>>| {
+            let two = |axis: Vec3<S>, direction: Option<Vec3<S>>| {
                 let first = direction.unwrap_or_else(|| axis.perpendicular());
                 [first, axis.cross(first)]
             };
-            let fixed = |joint: &Joint| joint.axis.filter(|_| joint.kind == JointKind::Fixed);
+            let fixed = |joint: &Joint<S>| joint.axis.filter(|_| joint.kind == JointKind::Fixed);
             match (fixed(&leg.base), fixed(&leg.platform)) {
                 (None, None) => b.chain(two(m, None).map(|w| d(n, w))).collect(),
                 (Some(delta), None) => b.chain(two(n, Some(delta)).map(|w| d(w, m))).collect(),
@@ -67,16 +61,26 @@ pub fn of_leg(index: usize, leg: &Leg) -> Vec<Constraint> {
 }
 
 /// The constraints of a rod that carries several legs: its revolute axes are fixed in it, so that the legs' planes
-/// through its line keep the angle that they have at home. L is divided by a length to make g one.
+/// through its line keep the angle that they have at home. L is divided by a length to make g one. Angle and length are
+/// the rod's own: they do not vary with points and axes.
 #[must_use]
-pub fn of_rod(mech_legs: &[Leg], rod: usize, axis: Vec3<f64>, home: &Pose<f64>) -> Vec<Constraint> {
+pub fn of_rod<S: Trig + Constant<S>>(
+    mech_legs: &[Leg<S>],
+    rod: usize,
+    axis: Vec3<S>,
+    home: &Pose<f64>,
+) -> Vec<Constraint<S>> {
     let on: Vec<usize> = (0..mech_legs.len()).filter(|&i| mech_legs[i].rod == Some(rod)).collect();
     let Some((&leader, others)) = on.split_first() else { return vec![] };
-    let across = |i: usize| axis.cross(leg::position(&mech_legs[i], home).r);
+    let fixed_axis = axis.map(Real::value);
+    let across = |i: usize| {
+        let (_, r) = leg::vectors(&mech_legs[i], &Pose::lift(home));
+        fixed_axis.cross(r.map(Real::value))
+    };
     let first = across(leader);
     let make = |&i: &usize| {
         let second = across(i);
-        let angle = first.cross(second).dot(axis).atan2(first.dot(second));
+        let angle = first.cross(second).dot(fixed_axis).atan2(first.dot(second));
         // Parallel up to the rounding of a file's numbers is parallel.
         let angle = if angle.abs() <= ANGLE_TOLERANCE { 0.0 } else { angle };
         Constraint {
@@ -84,12 +88,12 @@ pub fn of_rod(mech_legs: &[Leg], rod: usize, axis: Vec3<f64>, home: &Pose<f64>) 
             leg: i,
             base_point: mech_legs[i].base.point,
             platform_point: mech_legs[i].platform.point,
-            base_axis: axis * (1.0 / first.norm()),
+            base_axis: axis.scale(1.0 / first.norm()),
             platform_axis: Vec3::zero(),
             partner: Partner {
                 base_point: mech_legs[leader].base.point,
                 platform_point: mech_legs[leader].platform.point,
-                turn: Mat3::from_rotation_vector(axis * angle),
+                turn: Mat3::from_rotation_vector(axis.scale(angle)),
             },
         }
     };
@@ -97,12 +101,12 @@ pub fn of_rod(mech_legs: &[Leg], rod: usize, axis: Vec3<f64>, home: &Pose<f64>) 
 }
 
 /// What a joint says about the leg's normal n: square to an axis of its body, or along one.
-enum Normal {
-    Across(Vec3<f64>),
-    Along(Vec3<f64>),
+enum Normal<S> {
+    Across(Vec3<S>),
+    Along(Vec3<S>),
 }
 
-fn normal_of(kind: JointKind, joint: &Joint) -> Option<Normal> {
+fn normal_of<S: Scalar>(kind: JointKind, joint: &Joint<S>) -> Option<Normal<S>> {
     match kind {
         JointKind::Spherical => None,
         JointKind::Universal => joint.axis.map(Normal::Across),
@@ -125,7 +129,7 @@ struct Vectors<T> {
 }
 
 #[inline(always)]
-fn vectors<T: Real>(c: &Constraint, pose: &Pose<T>) -> Vectors<T> {
+fn vectors<T: Real>(c: &Constraint<impl Constant<T>>, pose: &Pose<T>) -> Vectors<T> {
     let e = pose.rotation.of(c.platform_point);
     let e1 = pose.rotation.of(c.partner.platform_point);
     Vectors {
@@ -140,13 +144,13 @@ fn vectors<T: Real>(c: &Constraint, pose: &Pose<T>) -> Vectors<T> {
 
 /// The gradients of kind E with respect to b_1 and b: `Qᵀ (r × L)` and `L × Q r_1`.
 #[inline(always)]
-fn rod_forces<T: Real>(c: &Constraint, v: &Vectors<T>) -> (Vec3<T>, Vec3<T>) {
+fn rod_forces<T: Real>(c: &Constraint<impl Constant<T>>, v: &Vectors<T>) -> (Vec3<T>, Vec3<T>) {
     (Mat3::lift(c.partner.turn).transpose_mul(v.r.cross(v.base)), v.base.cross(v.r1))
 }
 
 /// g(pose): metres for kinds A, B, C and E, a cosine for D \[T9\].
 #[inline(always)]
-pub fn value<T: Real>(c: &Constraint, pose: &Pose<T>) -> T {
+pub fn value<T: Real>(c: &Constraint<impl Constant<T>>, pose: &Pose<T>) -> T {
     let Vectors { r, base, platform, r1, .. } = vectors(c, pose);
     match c.kind {
         ConstraintKind::A => platform.cross(r).dot(base),
@@ -159,7 +163,7 @@ pub fn value<T: Real>(c: &Constraint, pose: &Pose<T>) -> T {
 
 /// The wrench (c, τ) at o with `ġ = c·v + τ·ω` \[T10\]; for kind A it is \[Eq. 11\].
 #[inline(always)]
-pub fn row<T: Real>(constraint: &Constraint, pose: &Pose<T>) -> Wrench<T> {
+pub fn row<T: Real>(constraint: &Constraint<impl Constant<T>>, pose: &Pose<T>) -> Wrench<T> {
     let v = vectors(constraint, pose);
     let Vectors { e, r, base, platform, .. } = v;
     match constraint.kind {
@@ -180,7 +184,7 @@ pub fn row<T: Real>(constraint: &Constraint, pose: &Pose<T>) -> Wrench<T> {
 
 /// The symmetric 6×6 matrix h with `g̈ = (c, τ)·A + Vᵀ h V` \[T12\]; for kind A the symmetric part of \[Eq. 17\].
 #[inline(always)]
-pub fn hessian<T: Real>(constraint: &Constraint, pose: &Pose<T>) -> Hessian<T> {
+pub fn hessian<T: Real>(constraint: &Constraint<impl Constant<T>>, pose: &Pose<T>) -> Hessian<T> {
     let v = vectors(constraint, pose);
     let Vectors { e, r, base, platform, .. } = v;
     let mut h = [[T::zero(); 6]; 6];
@@ -189,14 +193,17 @@ pub fn hessian<T: Real>(constraint: &Constraint, pose: &Pose<T>) -> Hessian<T> {
             // g̈ = [l''×r + 2 l'×v_b + l×a_b]·L with l' = ω × l
             add_centripetal(&mut h, e, base.cross(platform));
             add_centripetal(&mut h, platform, r.cross(base));
-            add_mixed(&mut h, e, |w| base.cross(w.cross(platform)));
+            let [x, y, z] = Mat3::identity().0;
+            let [x, y, z] = [x.cross(platform), y.cross(platform), z.cross(platform)];
+            add_mixed(&mut h, e, [base.cross(x), base.cross(y), base.cross(z)]);
         }
         ConstraintKind::B => add_centripetal(&mut h, e, base),
         ConstraintKind::C => {
             // g̈ = a_b·a_P + 2 v_b·a_P' + r·a_P''
             add_centripetal(&mut h, e, platform);
             add_centripetal(&mut h, platform, r);
-            add_mixed(&mut h, e, |w| w.cross(platform));
+            let [x, y, z] = Mat3::identity().0;
+            add_mixed(&mut h, e, [x.cross(platform), y.cross(platform), z.cross(platform)]);
         }
         ConstraintKind::D => add_centripetal(&mut h, platform, base),
         ConstraintKind::E => {
@@ -208,8 +215,9 @@ pub fn hessian<T: Real>(constraint: &Constraint, pose: &Pose<T>) -> Hessian<T> {
             let (at_first, at_second) = (point_columns(v.e1), point_columns(e));
             for i in 0..6 {
                 for j in 0..6 {
-                    let q = |i: usize, j: usize| (turn * at_first[i]).cross(at_second[j]).dot(base);
-                    h[i][j] = h[i][j] + q(i, j) + q(j, i);
+                    let q = (turn * at_first[i]).cross(at_second[j]).dot(base);
+                    h[i][j] = h[i][j] + q;
+                    h[j][i] = h[j][i] + q;
                 }
             }
         }
@@ -219,25 +227,30 @@ pub fn hessian<T: Real>(constraint: &Constraint, pose: &Pose<T>) -> Hessian<T> {
 
 /// What makes a constraint's value a pure number.
 #[must_use]
-pub fn unit(c: &Constraint, scale: f64) -> f64 {
+pub fn unit<S>(c: &Constraint<S>, scale: f64) -> f64 {
     if c.kind == ConstraintKind::D { 1.0 } else { scale }
 }
 
 /// What makes a constraint's value a length.
 #[must_use]
-pub fn length(c: &Constraint, scale: f64) -> f64 {
+pub fn length<S>(c: &Constraint<S>, scale: f64) -> f64 {
     if c.kind == ConstraintKind::D { scale } else { 1.0 }
 }
 
 /// Size of a row with its torque part divided by the length `scale`.
 #[must_use]
 pub fn row_size(row: &Wrench<f64>, scale: f64) -> f64 {
-    let torque = row.torque * (1.0 / scale);
-    (row.force.dot(row.force) + torque.dot(torque)).sqrt()
+    square(row, scale).sqrt()
+}
+
+/// The square of a row's size.
+#[inline(always)]
+pub(crate) fn square<T: Real>(row: &Wrench<T>, scale: f64) -> T {
+    row.force.dot(row.force) + row.torque.dot(row.torque).scale(1.0 / (scale * scale))
 }
 
 /// Rows smaller than this vanish: they give no direction and no distance.
-const VANISHING_ROW: f64 = 1e-6;
+pub(crate) const VANISHING_ROW: f64 = 1e-6;
 
 /// What a row is divided by to make it one of size one; a row that vanishes stays as small as it is.
 #[must_use]

@@ -8,7 +8,7 @@ use crate::constraint;
 use crate::linear::{Solved, solve};
 use crate::mechanism::{Constraint, ConstraintKind, MAX_CONSTRAINTS, Mechanism};
 use crate::mobility::count;
-use crate::real::{Dual, Jet, Real, Trig};
+use crate::real::{Constant, Dual, Jet, Mask, Ordered, Real, Scalar, Trig};
 use crate::spatial::{Acceleration, Mat3, Motion, Pose, Twist, Vec3};
 use crate::status::Status;
 
@@ -19,23 +19,23 @@ pub type Values<T> = [T; MAX_COORDINATES];
 
 /// Frames of a mechanism whose one independent constraint is of kind A: X along L, x along l.
 #[derive(Clone, Copy, Debug)]
-pub struct Plane {
+pub struct Plane<S = f64> {
     /// Base axes of the angles, columns; the first is L.
-    base: Mat3<f64>,
+    base: Mat3<S>,
     /// Platform axes of the angles, columns; the first is l.
-    platform: Mat3<f64>,
+    platform: Mat3<S>,
     /// A point of the line L, base axes: the middle of the base joints that share the constraint.
-    base_point: Vec3<f64>,
+    base_point: Vec3<S>,
     /// The middle of their platform joints, platform axes; it stays in the plane of L and l.
-    platform_point: Vec3<f64>,
+    platform_point: Vec3<S>,
 }
 
 #[derive(Clone, Copy, Debug)]
-pub enum Set {
+pub enum Set<S = f64> {
     /// (x, y, z, α, β), γ from [Eq. 5] by its branch.
-    Paper(Plane),
+    Paper(Plane<S>),
     /// (α, p, h, β, γ): no dependent coordinate, no fold \[T20\].
-    Natural(Plane),
+    Natural(Plane<S>),
     /// Tip position and tool axis direction, the turn about the tool from the constraint \[T21\].
     Tool,
     /// x, y, z and the angles of Rx(rx) Ry(ry) Rz(rz) \[T22\].
@@ -56,7 +56,7 @@ const SOLVED: f64 = 1e-12;
 
 const NEWTON_STEPS: usize = 50;
 
-impl Set {
+impl<S: Scalar> Set<S> {
     #[must_use]
     pub fn name(&self) -> &'static str {
         match self {
@@ -78,6 +78,55 @@ impl Set {
         }
     }
 
+    /// The set of the same name for the mechanism while it varies.
+    #[must_use]
+    pub fn varied<V: Scalar>(&self, mech: &Mechanism<V>) -> Option<Set<V>> {
+        Some(match self {
+            Set::Paper(_) => Set::Paper(Plane::varied(mech)?),
+            Set::Natural(_) => Set::Natural(Plane::varied(mech)?),
+            Set::Tool => Set::Tool,
+            Set::Pose => Set::Pose,
+        })
+    }
+
+    /// The map from the numbers to the pose.
+    #[inline(always)]
+    pub fn pose<T: Trig>(&self, mech: &Mechanism<S>, q: &Values<T>) -> Pose<T>
+    where
+        S: Constant<T>,
+    {
+        match self {
+            Set::Paper(plane) => {
+                // [Eq. 2] R in the order XYX, o = (X_o, Y_o, Z_o)
+                let turns = [q[3].sin_cos(), q[4].sin_cos(), q[5].sin_cos()];
+                Pose { rotation: plane.rotation(turns), o: Vec3::new(q[0], q[1], q[2]) }
+            }
+            Set::Natural(plane) => {
+                // [T20] middle of b_1 b_3 = point of L + p L + h Rx(α) e_z
+                let [alpha, p, h, beta, gamma, ..] = *q;
+                let (s, c) = alpha.sin_cos();
+                let rotation = plane.rotation([(s, c), beta.sin_cos(), gamma.sin_cos()]);
+                let middle = Vec3::lift(plane.base_point) + times(&plane.base, Vec3::new(p, -(h * s), h * c));
+                Pose { rotation, o: middle - rotation.of(plane.platform_point) }
+            }
+            Set::Tool => {
+                // [T21] R = (home axis → axis) (turn about the home axis) R_home
+                let [x, y, z, i, j, k, turn] = *q;
+                let home_axis = mech.home.rotation * mech.tool_axis;
+                let direction = Vec3::new(i, j, k).unit();
+                let tilt = Mat3::shortest_turn(Vec3::lift(home_axis), direction);
+                let rotation = tilt * turn_about(home_axis, turn) * Mat3::lift(mech.home.rotation);
+                Pose { rotation, o: Vec3::new(x, y, z) - rotation * Vec3::lift(mech.tool_point) }
+            }
+            Set::Pose => {
+                let turns = [q[3].sin_cos(), q[4].sin_cos(), q[5].sin_cos()];
+                Pose { rotation: turn_xyz(turns), o: Vec3::new(q[0], q[1], q[2]) }
+            }
+        }
+    }
+}
+
+impl Set {
     /// The sets that a mechanism has.
     #[must_use]
     pub fn of(mech: &Mechanism) -> Vec<Set> {
@@ -103,41 +152,6 @@ impl Set {
             Set::Natural(_) => Some(vec![true; 5]),
             Set::Tool => Some((0..7).map(|i| i < 6 || mech.dof() == 6).collect()),
             Set::Pose => None,
-        }
-    }
-
-    /// The map from the numbers to the pose.
-    #[inline(always)]
-    pub fn pose<T: Trig>(&self, mech: &Mechanism, q: &Values<T>) -> Pose<T> {
-        match self {
-            Set::Paper(plane) => {
-                // [Eq. 2] R in the order XYX, o = (X_o, Y_o, Z_o)
-                Pose { rotation: plane.rotation(q[3], q[4], q[5]), o: Vec3::new(q[0], q[1], q[2]) }
-            }
-            Set::Natural(plane) => {
-                // [T20] middle of b_1 b_3 = point of L + p L + h Rx(α) e_z
-                let [alpha, p, h, beta, gamma, ..] = *q;
-                let rotation = plane.rotation(alpha, beta, gamma);
-                let (s, c) = alpha.sin_cos();
-                let middle =
-                    Vec3::lift(plane.base_point) + Mat3::lift(plane.base) * Vec3::new(p, -(h * s), h * c);
-                Pose { rotation, o: middle - rotation * Vec3::lift(plane.platform_point) }
-            }
-            Set::Tool => {
-                // [T21] R = (home axis → axis) (turn about the home axis) R_home
-                let [x, y, z, i, j, k, turn] = *q;
-                let home_axis = mech.home.rotation * mech.tool_axis;
-                let direction = Vec3::new(i, j, k).unit();
-                let tilt = Mat3::shortest_turn(Vec3::lift(home_axis), direction);
-                let rotation = tilt * turn_about(home_axis, turn) * Mat3::lift(mech.home.rotation);
-                Pose { rotation, o: Vec3::new(x, y, z) - rotation * Vec3::lift(mech.tool_point) }
-            }
-            Set::Pose => {
-                let turn = Mat3::rotation_x(q[3].sin_cos())
-                    * Mat3::rotation_y(q[4].sin_cos())
-                    * Mat3::rotation_z(q[5].sin_cos());
-                Pose { rotation: turn, o: Vec3::new(q[0], q[1], q[2]) }
-            }
         }
     }
 
@@ -183,10 +197,10 @@ impl Set {
     }
 }
 
-impl Plane {
+impl<S: Scalar> Plane<S> {
     /// The frames of a mechanism with one independent constraint, of kind A; none for others.
     #[must_use]
-    pub fn of(mech: &Mechanism) -> Option<Self> {
+    pub fn of(mech: &Mechanism<S>) -> Option<Self> {
         let [c] = mech.independent.as_slice() else {
             return None;
         };
@@ -194,7 +208,8 @@ impl Plane {
             return None;
         }
         // The legs whose A constraint is the same one: same axes, platform joints on one line along l.
-        let parallel = |a: Vec3<f64>, b: Vec3<f64>| a.cross(b).norm() <= 1e-9 * a.norm() * b.norm();
+        let size = |a: Vec3<S>| a.norm().value();
+        let parallel = |a: Vec3<S>, b: Vec3<S>| size(a.cross(b)) <= 1e-9 * size(a) * size(b);
         let sharing: Vec<_> = mech
             .constraints
             .iter()
@@ -208,8 +223,8 @@ impl Plane {
             })
             .collect();
         let share = 1.0 / count(sharing.len());
-        let mean = |point: fn(&Constraint) -> Vec3<f64>| {
-            sharing.iter().map(|d| point(d)).fold(Vec3::zero(), |sum, p| sum + p) * share
+        let mean = |point: fn(&Constraint<S>) -> Vec3<S>| {
+            sharing.iter().map(|d| point(d)).fold(Vec3::zero(), |sum, p| sum + p).scale(share)
         };
         Some(Plane {
             base: frame_along(c.base_axis),
@@ -219,15 +234,30 @@ impl Plane {
         })
     }
 
-    /// [Eq. 2] `R = Rx(α) Ry(β) Rx(γ)` between the plane's axes of base and platform.
-    #[inline(always)]
-    fn rotation<T: Trig>(&self, alpha: T, beta: T, gamma: T) -> Mat3<T> {
-        let xyx = Mat3::rotation_x(alpha.sin_cos())
-            * Mat3::rotation_y(beta.sin_cos())
-            * Mat3::rotation_x(gamma.sin_cos());
-        Mat3::lift(self.base) * xyx * Mat3::lift(self.platform.transpose())
+    /// The frames while the joints that share the constraint vary one by one: the middles then stay on the lines of
+    /// the independent one \[T56\].
+    fn varied(mech: &Mechanism<S>) -> Option<Self> {
+        let (plane, c) = (Plane::of(mech)?, mech.independent.first()?);
+        let on = |line: Vec3<S>, from: Vec3<S>, point: Vec3<S>| from + line * line.dot(point - from);
+        Some(Plane {
+            base_point: on(c.base_axis, c.base_point, plane.base_point),
+            platform_point: on(c.platform_axis, c.platform_point, plane.platform_point),
+            ..plane
+        })
     }
 
+    /// [Eq. 2] `R = Rx(α) Ry(β) Rx(γ)` between the plane's axes of base and platform.
+    #[inline(always)]
+    fn rotation<T: Trig>(&self, turns: [(T, T); 3]) -> Mat3<T>
+    where
+        S: Constant<T>,
+    {
+        let (xyx, [x, y, z]) = (turn_xyx(turns), self.platform.transpose().0);
+        Mat3([times(&self.base, xyx.of(x)), times(&self.base, xyx.of(y)), times(&self.base, xyx.of(z))])
+    }
+}
+
+impl Plane {
     /// The signed distance of the reference point from the line through o along l, and its angle about that line,
     /// within a quarter turn of y: for the paper (e sin θ_1, 0).
     fn lever(&self) -> (f64, f64) {
@@ -241,7 +271,7 @@ impl Plane {
     #[inline(always)]
     fn cosine<T: Trig>(&self, o: Vec3<T>, alpha: T) -> T {
         let (s, c) = alpha.sin_cos();
-        let normal = Mat3::lift(self.base) * Vec3::new(T::zero(), c, s);
+        let normal = times(&self.base, Vec3::new(T::zero(), c, s));
         normal.dot(Vec3::lift(self.base_point) - o) / T::lit(self.lever().0)
     }
 
@@ -264,21 +294,56 @@ impl Plane {
 }
 
 /// Columns x along `axis`, z as near to the body's z as it can be, y to the right of both.
-fn frame_along(axis: Vec3<f64>) -> Mat3<f64> {
+fn frame_along<S: Scalar>(axis: Vec3<S>) -> Mat3<S> {
     let x = axis.unit();
-    let y = Vec3::Z.cross(x);
-    let y = if y.norm() > 1e-9 { y.unit() } else { Vec3::Y };
+    let y = Vec3::lift(Vec3::Z).cross(x);
+    let y = if y.norm().value() > 1e-9 { y.unit() } else { Vec3::lift(Vec3::Y) };
     Mat3::from_columns(x, y, x.cross(y))
+}
+
+/// A constant matrix times a vector.
+#[inline(always)]
+fn times<S: Constant<T>, T: Real>(m: &Mat3<S>, a: Vec3<T>) -> Vec3<T> {
+    let [x, y, z] = m.0;
+    Vec3::new(
+        x.x.times(a.x) + y.x.times(a.y) + z.x.times(a.z),
+        x.y.times(a.x) + y.y.times(a.y) + z.y.times(a.z),
+        x.z.times(a.x) + y.z.times(a.y) + z.z.times(a.z),
+    )
+}
+
+/// `Rx(α) Ry(β) Rx(γ)` from sines and cosines.
+#[inline(always)]
+fn turn_xyx<T: Real>([(s1, c1), (s2, c2), (s3, c3)]: [(T, T); 3]) -> Mat3<T> {
+    let (sin, cos) = (c2 * s3, c2 * c3);
+    Mat3::from_rows([
+        [c2, s2 * s3, s2 * c3],
+        [s1 * s2, c1 * c3 - s1 * sin, -(c1 * s3) - s1 * cos],
+        [-(c1 * s2), s1 * c3 + c1 * sin, c1 * cos - s1 * s3],
+    ])
+}
+
+/// `Rx Ry Rz` from sines and cosines.
+#[inline(always)]
+fn turn_xyz<T: Real>([(s1, c1), (s2, c2), (s3, c3)]: [(T, T); 3]) -> Mat3<T> {
+    let (sin, cos) = (s2 * s3, s2 * c3);
+    Mat3::from_rows([
+        [c2 * c3, -(c2 * s3), s2],
+        [c1 * s3 + s1 * cos, c1 * c3 - s1 * sin, -(s1 * c2)],
+        [s1 * s3 - c1 * cos, s1 * c3 + c1 * sin, c1 * c2],
+    ])
 }
 
 /// Rodrigues' formula for a turn about a constant unit axis.
 #[inline(always)]
 fn turn_about<T: Trig>(axis: Vec3<f64>, angle: T) -> Mat3<T> {
     let (s, c) = angle.sin_cos();
-    Mat3([Vec3::X, Vec3::Y, Vec3::Z].map(|e: Vec3<f64>| {
+    let mut columns = Mat3::identity().0;
+    for (column, e) in columns.iter_mut().zip([Vec3::X, Vec3::Y, Vec3::Z]) {
         let along = axis * axis.dot(e);
-        Vec3::lift(along) + Vec3::lift(e - along) * c + Vec3::lift(axis.cross(e)) * s
-    }))
+        *column = Vec3::lift(along) + Vec3::lift(e - along) * c + Vec3::lift(axis.cross(e)) * s;
+    }
+    Mat3(columns)
 }
 
 /// A state of the platform with all numbers of its coordinate set.
@@ -307,55 +372,80 @@ pub fn state(
     let mut q = *q;
     let finite =
         q.iter().zip(given).all(|(c, g)| !g || (c.x.is_finite() && c.d.is_finite() && c.dd.is_finite()));
-    let (status, branch) = match (set, finite) {
-        (_, false) => (Status::InvalidInput, f64::NAN),
-        (Set::Tool, _) if tool_turn(mech, &q) != Status::Ok => (tool_turn(mech, &q), f64::NAN),
-        (Set::Paper(plane), _) => (branch_of_gamma(plane, &mut q, branch), branch),
-        _ => solve_dependent(mech, set, &mut q, given, guess),
+    let failing = if finite { first(complete(mech, set, &mut q, branch)) } else { Status::InvalidInput };
+    let (status, branch) = match (set, failing) {
+        (Set::Paper(_), status) => (status, if finite { branch } else { f64::NAN }),
+        (_, Status::Ok) => solve_dependent(mech, set, &mut q, given, guess),
+        (_, status) => (status, f64::NAN),
     };
     State { coordinates: q, platform: motion(&set.pose(mech, &q)), branch, status }
 }
 
-/// Pose, twist and acceleration of a pose known with its rates \[T19\].
-fn motion<T: Trig>(pose: &Pose<Jet<T>>) -> Motion<T> {
-    let (r, o) = (&pose.rotation, pose.o);
-    Motion {
-        pose: Pose { rotation: Mat3(r.0.map(|c| c.map(|j| j.x))), o: o.map(|j| j.x) },
-        twist: Twist::new(o.map(|j| j.d), half_cross(r, |j| j.d)),
-        acceleration: Acceleration::new(o.map(|j| j.dd), half_cross(r, |j| j.dd)),
+/// What must hold, each with the status where it does not; the first that fails counts.
+pub type Conditions<V> = [(Mask<V>, Status); 2];
+
+fn first(conditions: Conditions<f64>) -> Status {
+    conditions.into_iter().find(|(holds, _)| !holds).map_or(Status::Ok, |(_, status)| status)
+}
+
+/// Puts what the set itself makes dependent, which is γ of [Eq. 5], and tells what must hold for a pose with rates.
+#[inline(always)]
+pub fn complete<V: Ordered>(
+    mech: &Mechanism,
+    set: &Set,
+    q: &mut Values<Jet<V>>,
+    branch: f64,
+) -> Conditions<V> {
+    match set {
+        Set::Paper(plane) => branch_of_gamma(plane, q, branch),
+        Set::Tool => tool_turn(mech, q),
+        _ => [(V::zero().at_most(V::zero()), Status::Ok); 2],
     }
+}
+
+/// Pose, twist and acceleration of a pose known with its rates \[T19\].
+#[inline(always)]
+pub fn motion<T: Real>(pose: &Pose<Jet<T>>) -> Motion<T> {
+    let [x, y, z] = pose.rotation.0;
+    let (values, rates) = ([parts(x)[0], parts(y)[0], parts(z)[0]], [parts(x)[1], parts(y)[1], parts(z)[1]]);
+    let ([o, v, a], second) = (parts(pose.o), [parts(x)[2], parts(y)[2], parts(z)[2]]);
+    Motion {
+        pose: Pose { rotation: Mat3(values), o },
+        twist: Twist::new(v, half_cross(values, rates)),
+        acceleration: Acceleration::new(a, half_cross(values, second)),
+    }
+}
+
+/// Value, rate and second rate.
+#[inline(always)]
+fn parts<T: Real>(a: Vec3<Jet<T>>) -> [Vec3<T>; 3] {
+    [Vec3::new(a.x.x, a.y.x, a.z.x), Vec3::new(a.x.d, a.y.d, a.z.d), Vec3::new(a.x.dd, a.y.dd, a.z.dd)]
 }
 
 /// The numbers of the set with their rates along a motion: the inverse of [`state`].
 #[must_use]
 pub fn along(mech: &Mechanism, set: &Set, platform: &Motion<f64>) -> Values<Jet<f64>> {
-    let Motion { pose, twist, acceleration } = platform;
-    let second = acceleration.eps;
-    // [T2] with the columns of R for e: x' = ω × x, x'' = ε × x + ω × (ω × x)
-    let column = |x: Vec3<f64>| {
-        let x1 = twist.omega.cross(x);
-        jets(x, x1, second.cross(x) + twist.omega.cross(x1))
-    };
-    let o = jets(pose.o, twist.v, acceleration.a);
-    set.values(mech, &Pose { rotation: Mat3(pose.rotation.0.map(column)), o })
-}
-
-fn jets(x: Vec3<f64>, d: Vec3<f64>, dd: Vec3<f64>) -> Vec3<Jet<f64>> {
-    Vec3::new(Jet::new(x.x, d.x, dd.x), Jet::new(x.y, d.y, dd.y), Jet::new(x.z, d.z, dd.z))
+    set.values(mech, &platform.jets())
 }
 
 /// The motion with given coordinates that vary as duals; the others, whose values are known, follow so that the
 /// constraints are kept: by one Newton step in duals, which is exact from a solution on \[T56\]. With the pivot ratio of
 /// what determines them.
 #[must_use]
-pub fn varied(
-    mech: &Mechanism,
-    set: &Set,
+pub fn varied<S>(
+    mech: &Mechanism<S>,
+    set: &Set<S>,
     q: &Values<Jet<Dual<f64>>>,
     given: &[bool],
-) -> (Motion<Dual<f64>>, f64) {
+) -> (Motion<Dual<f64>>, f64)
+where
+    S: Constant<Jet<Dual<f64>>> + Constant<Dual<Dual<f64>>>,
+{
     let mut q = *q;
     let dependent: Vec<usize> = (0..set.names().len()).filter(|&i| !given[i]).collect();
+    if dependent.is_empty() {
+        return (motion(&set.pose(mech, &q)), 1.0);
+    }
     let residual = constraint_parts(mech, &set.pose(mech, &q), |g| -g.x);
     let step = solve(gradient(mech, set, &q, &dependent), residual).x;
     for (&i, s) in dependent.iter().zip(step) {
@@ -367,40 +457,38 @@ pub fn varied(
 }
 
 /// Whether there is a shortest turn from the tool axis at home: not to no direction, and not to the opposite one.
-fn tool_turn(mech: &Mechanism, q: &Values<Jet<f64>>) -> Status {
+#[inline(always)]
+fn tool_turn<V: Ordered>(mech: &Mechanism, q: &Values<Jet<V>>) -> Conditions<V> {
     let axis = Vec3::new(q[3].x, q[4].x, q[5].x);
-    let cosine = axis.dot(mech.home.rotation * mech.tool_axis) / axis.norm();
-    if cosine.is_nan() {
-        Status::InvalidInput
-    } else if 1.0 + cosine < FOLD * FOLD {
-        Status::Fold
-    } else {
-        Status::Ok
-    }
+    let cosine = axis.dot(Vec3::lift(mech.home.rotation * mech.tool_axis)) / axis.norm();
+    [
+        (cosine.at_most(cosine), Status::InvalidInput),
+        (V::lit(FOLD * FOLD).at_most(V::one() + cosine), Status::Fold),
+    ]
 }
 
 /// `½ Σ x_i × x_i'` over the columns of R is ω, `½ Σ x_i × x_i''` is ε \[T19\].
-fn half_cross<T: Trig>(r: &Mat3<Jet<T>>, part: fn(Jet<T>) -> T) -> Vec3<T> {
-    r.0.iter().map(|c| c.map(|j| j.x).cross(c.map(part))).fold(Vec3::zero(), |sum, w| sum + w).scale(0.5)
+#[inline(always)]
+fn half_cross<T: Real>([x, y, z]: [Vec3<T>; 3], [dx, dy, dz]: [Vec3<T>; 3]) -> Vec3<T> {
+    (x.cross(dx) + y.cross(dy) + z.cross(dz)).scale(0.5)
 }
 
 /// γ from [Eq. 5]: `γ = ± arccos(...)`, the sign being the branch.
-fn branch_of_gamma(plane: &Plane, q: &mut Values<Jet<f64>>, branch: f64) -> Status {
+#[inline(always)]
+fn branch_of_gamma<V: Ordered>(plane: &Plane, q: &mut Values<Jet<V>>, branch: f64) -> Conditions<V> {
     let cosine = plane.cosine(Vec3::new(q[0], q[1], q[2]), q[3]);
-    let sign = branch.signum();
-    let offset = Jet::lit(plane.lever().1);
-    let nan = Jet::new(f64::NAN, f64::NAN, f64::NAN);
-    if !(cosine.x.abs() <= 1.0 + COSINE_ROUNDING) {
-        q[5] = nan;
-        return Status::NoBranch;
-    }
-    if 1.0 - cosine.x * cosine.x < FOLD * FOLD {
-        let gamma = sign * cosine.x.clamp(-1.0, 1.0).acos();
-        q[5] = Jet::new(gamma, f64::NAN, f64::NAN) - offset;
-        return Status::Fold;
-    }
-    q[5] = Jet::lit(sign) * cosine.acos() - offset;
-    Status::Ok
+    let exists = cosine.x.abs().at_most(V::lit(1.0 + COSINE_ROUNDING));
+    let regular = V::lit(FOLD * FOLD).at_most(V::one() - cosine.x * cosine.x);
+    let inside = cosine.x.most(V::lit(-1.0)).least(V::one());
+    let gamma =
+        Jet::new(inside, cosine.d, cosine.dd).acos().scale(branch.signum()) - Jet::lit(plane.lever().1);
+    let nan = V::lit(f64::NAN);
+    q[5] = Jet::new(
+        V::select(exists, gamma.x, nan),
+        V::select(exists, V::select(regular, gamma.d, nan), nan),
+        V::select(exists, V::select(regular, gamma.dd, nan), nan),
+    );
+    [(exists, Status::NoBranch), (regular, Status::Fold)]
 }
 
 type System<T> = [T; MAX_CONSTRAINTS];
@@ -476,7 +564,15 @@ fn solve_dependent(
 
 /// Rates and second rates of the dependent coordinates at known values, from one matrix: `G_y y' = -ġ(y' = 0)`,
 /// `G_y y'' = -g̈(y'' = 0)` \[T23\]. They must be zero before. With the pivot ratio and the sign of det G_y.
-fn follow<T: Trig>(mech: &Mechanism, set: &Set, q: &mut Values<Jet<T>>, dependent: &[usize]) -> (f64, f64) {
+fn follow<T: Trig, S>(
+    mech: &Mechanism<S>,
+    set: &Set<S>,
+    q: &mut Values<Jet<T>>,
+    dependent: &[usize],
+) -> (T::Value, T::Value)
+where
+    S: Constant<Jet<T>> + Constant<Dual<T>>,
+{
     let matrix = gradient(mech, set, q, dependent);
     let rates = |q: &Values<Jet<T>>, part: fn(Jet<T>) -> T| -> Solved<T, System<T>> {
         solve(matrix, constraint_parts(mech, &set.pose(mech, q), part))
@@ -493,7 +589,11 @@ fn follow<T: Trig>(mech: &Mechanism, set: &Set, q: &mut Values<Jet<T>>, dependen
 }
 
 /// What `part` takes of the values of the independent constraints in pure numbers; zero beyond their number.
-fn constraint_parts<S: Real, T: Real>(mech: &Mechanism, pose: &Pose<S>, part: fn(S) -> T) -> System<T> {
+fn constraint_parts<N: Real, T: Real>(
+    mech: &Mechanism<impl Constant<N>>,
+    pose: &Pose<N>,
+    part: fn(N) -> T,
+) -> System<T> {
     std::array::from_fn(|k| {
         mech.independent.get(k).map_or_else(T::zero, |c| {
             part(constraint::value(c, pose)) / T::lit(constraint::unit(c, mech.characteristic_length))
@@ -529,9 +629,9 @@ fn reach(set: &Set, index: usize, scale: f64) -> f64 {
 }
 
 /// ∂g/∂y by duals, unused rows and columns those of the identity.
-fn gradient<T: Trig>(
-    mech: &Mechanism,
-    set: &Set,
+fn gradient<T: Trig, S: Constant<Dual<T>>>(
+    mech: &Mechanism<S>,
+    set: &Set<S>,
     q: &Values<Jet<T>>,
     dependent: &[usize],
 ) -> [System<T>; MAX_CONSTRAINTS] {

@@ -1,10 +1,11 @@
-//! Derivatives of inverse dynamics by the motion: the same equations with dual numbers, one direction at a time
-//! \[T56\].
+//! Derivatives of inverse dynamics by the motion and by the geometry: the same equations with dual numbers, one
+//! direction at a time \[T56\].
 
 use crate::coordinates::{self, MAX_COORDINATES, Set, Values};
 use crate::dynamics;
+use crate::leg;
 use crate::mechanism::Mechanism;
-use crate::real::{Dual, Jet};
+use crate::real::{Constant, Dual, Jet};
 use crate::spatial::{Acceleration, Motion, Pose, Twist, Wrench};
 
 /// What a motion is varied in.
@@ -50,7 +51,11 @@ pub fn by_motion(mech: &Mechanism, platform: &Motion<f64>, load: &impl Load, par
     })
 }
 
-fn forces(mech: &Mechanism, varied: &Motion<Dual<f64>>, load: &impl Load) -> [f64; 6] {
+fn forces(
+    mech: &Mechanism<impl Constant<Dual<f64>>>,
+    varied: &Motion<Dual<f64>>,
+    load: &impl Load,
+) -> [f64; 6] {
     dynamics::inverse_dynamics(mech, varied, load(&varied.pose)).0.map(|f| f.d)
 }
 
@@ -68,8 +73,7 @@ pub fn by_coordinates(
     let mut columns: [Vec<[f64; 6]>; 3] = [vec![], vec![], vec![]];
     for k in (0..set.names().len()).filter(|&k| given[k]) {
         for (order, columns) in columns.iter_mut().enumerate() {
-            let mut seeded: Values<Jet<Dual<f64>>> =
-                q.map(|c| Jet::new(Dual::new(c.x, 0.0), Dual::new(c.d, 0.0), Dual::new(c.dd, 0.0)));
+            let mut seeded = kept(&q);
             match order {
                 0 => seeded[k].x.d = 1.0,
                 1 => seeded[k].d.d = 1.0,
@@ -85,4 +89,37 @@ pub fn by_coordinates(
         }
     }
     Some(columns)
+}
+
+/// Coordinates and their rates that do not vary.
+fn kept(q: &Values<Jet<f64>>) -> Values<Jet<Dual<f64>>> {
+    q.map(|c| Jet::new(Dual::new(c.x, 0.0), Dual::new(c.d, 0.0), Dual::new(c.dd, 0.0)))
+}
+
+/// What varies with one number of the geometry.
+#[derive(Clone, Debug)]
+pub struct ByGeometry {
+    /// Active forces and multipliers.
+    pub forces: [f64; 6],
+    /// Lengths of all legs.
+    pub lengths: Vec<f64>,
+}
+
+/// Derivatives by the number of the geometry that the mechanism `varied` varies with, the given coordinates, their rates
+/// and second rates kept and dependent coordinates following; none where the coordinates do not determine the motion.
+#[must_use]
+pub fn by_geometry(
+    varied: &Mechanism<Dual<f64>>,
+    q: &Values<Jet<f64>>,
+    load: &impl Load,
+    set: &Set<Dual<f64>>,
+    given: &[bool; MAX_COORDINATES],
+) -> Option<ByGeometry> {
+    let (platform, pivots) = coordinates::varied(varied, set, &kept(q), given);
+    let column = ByGeometry {
+        forces: forces(varied, &platform, load),
+        lengths: varied.legs.iter().map(|leg| leg::position(leg, &platform.pose).length.d).collect(),
+    };
+    let finite = column.forces.iter().chain(&column.lengths).all(|x| x.is_finite());
+    (pivots > coordinates::DEPENDENT_PIVOTS && finite).then_some(column)
 }

@@ -5,7 +5,7 @@ use crate::jacobian::{Matrix6, scaled_jacobian};
 use crate::leg;
 use crate::linear::solve;
 use crate::mechanism::{Body, Leg, Mechanism, Rod};
-use crate::real::Real;
+use crate::real::{Constant, Real};
 use crate::spatial::{Acceleration, Mat3, Motion, Pose, Twist, Vec3, Wrench};
 use crate::spec::Axes;
 
@@ -25,17 +25,22 @@ pub(crate) fn inertial_force<T: Real>(body: &Body, gravity: Vec3<T>, a: Vec3<T>)
     (gravity - a) * T::lit(body.mass)
 }
 
-/// Inertial torque `t = -(I ε + ω × I ω)` with the inertia turned into base axes [Eq. 40, completed] \[T13\].
+/// Inertial torque `t = -(I ε + ω × I ω)` in the link's own axes [Eq. 40, completed] \[T13\].
 #[inline(always)]
-pub(crate) fn inertial_torque<T: Real>(body: &Body, axes: Mat3<T>, omega: Vec3<T>, eps: Vec3<T>) -> Vec3<T> {
-    let inertia = Mat3::lift(body.inertia);
-    let (omega, eps) = (axes.transpose_mul(omega), axes.transpose_mul(eps));
-    -(axes * (inertia * eps + omega.cross(inertia * omega)))
+pub(crate) fn turning_torque<T: Real>(inertia: Mat3<f64>, omega: Vec3<T>, eps: Vec3<T>) -> Vec3<T> {
+    let inertia = Mat3::lift(inertia);
+    -(inertia * eps + omega.cross(inertia * omega))
+}
+
+/// The same of a link with the given axes, all in base axes.
+#[inline(always)]
+fn inertial_torque<T: Real>(body: &Body, axes: Mat3<T>, omega: Vec3<T>, eps: Vec3<T>) -> Vec3<T> {
+    axes * turning_torque(body.inertia, axes.transpose_mul(omega), axes.transpose_mul(eps))
 }
 
 /// The platform's own term of [Eq. 42]: weight, inertia and damping, as a wrench at o.
 #[inline(always)]
-pub fn platform_wrench<T: Real>(mech: &Mechanism, platform: &Motion<T>) -> Wrench<T> {
+pub fn platform_wrench<T: Real>(mech: &Mechanism<impl Constant<T>>, platform: &Motion<T>) -> Wrench<T> {
     let Motion { pose, twist, acceleration } = platform;
     let body = &mech.platform;
     let center = pose.rotation * Vec3::lift(body.center);
@@ -47,41 +52,87 @@ pub fn platform_wrench<T: Real>(mech: &Mechanism, platform: &Motion<T>) -> Wrenc
 
 /// The platform's damping, a part of [Eq. 42]: `f_d = -μ v, t_d = -μ ω`.
 #[inline(always)]
-pub fn damping_wrench<T: Real>(mech: &Mechanism, twist: &Twist<T>) -> Wrench<T> {
+pub fn damping_wrench<T: Real>(mech: &Mechanism<impl Constant<T>>, twist: &Twist<T>) -> Wrench<T> {
     Wrench::new(-(twist.v * T::lit(mech.linear_damping)), -(twist.omega * T::lit(mech.angular_damping)))
 }
 
 /// Cylinder, piston and the rods that the leg leads, carried to the platform \[T14\].
 #[inline(always)]
-fn leg_wrench<T: Real>(mech: &Mechanism, index: usize, leg: &Leg, platform: &Motion<T>) -> Wrench<T> {
-    let gravity = Vec3::lift(mech.gravity);
-    let state = leg::state(leg, platform);
-    let (f, turn) = (&state.frame, &state.turn);
-    let (piston, cylinder) = (leg::piston(leg, &state), leg::cylinder(leg, &state));
-    let force = inertial_force(&leg.piston, gravity, piston.acceleration);
-    let torque = piston.offset.cross(force)
-        + cylinder.offset.cross(inertial_force(&leg.cylinder, gravity, cylinder.acceleration))
-        + inertial_torque(&leg.piston, f.axes, turn.omega, turn.eps)
-        + inertial_torque(&leg.cylinder, f.axes, turn.omega, turn.eps);
-    let mut wrench = leg::carry(leg, &state, force, torque);
-    for rod in mech.rods.iter().filter(|rod| rod.leader == index) {
-        let about = rod_torque(mech, rod, &state);
-        // The rod's power is its torque about L times ω_L = n·δ'/|L×δ|, with δ' = (v_b - ℓ'δ)/ℓ and n square to δ.
-        let p = &state.position;
-        wrench = wrench + Wrench::at(p.e, f.n() * (about / (f.sine * p.length)));
+pub(crate) fn leg_wrench<T: Real>(
+    mech: &Mechanism<impl Constant<T>>,
+    index: usize,
+    leg: &Leg<impl Constant<T>>,
+    place: &leg::Place<T>,
+    platform: &Motion<T>,
+) -> Wrench<T> {
+    let state = leg::moving(leg, place, platform);
+    let mut wrench = links_wrench(mech, leg, &state);
+    for rod in &mech.rods {
+        if rod.leader == index {
+            wrench = wrench + carried_rod(mech, rod, &state);
+        }
     }
     wrench
 }
 
+/// Cylinder and piston, carried to the platform. All along n, δ, m.
+#[inline(always)]
+pub(crate) fn links_wrench<T: Real>(
+    mech: &Mechanism<impl Constant<T>>,
+    leg: &Leg<impl Constant<T>>,
+    state: &leg::State<T>,
+) -> Wrench<T> {
+    let axes = state.frame.axes;
+    let at_base = axes.transpose_mul(Vec3::lift(mech.gravity));
+    let at_b = at_base - axes.transpose_mul(state.end.a_b);
+    let (force, about_b) = turning_force(&leg.piston, &state.turn, at_b);
+    let (_, about_base) = turning_force(&leg.cylinder, &state.turn, at_base);
+    // Both turn as one.
+    let inertia = leg.piston.inertia + leg.cylinder.inertia;
+    let torque = turning_torque(inertia, state.turn.omega, state.turn.eps);
+    leg::carry(leg, state, force, torque + about_b + about_base)
+}
+
+/// Weight and inertial force of a link of a leg \[T8\] \[T13\], and its torque about the link's reference point;
+/// `push` is gravity less the acceleration of that point.
+#[inline(always)]
+fn turning_force<T: Real>(body: &Body, turn: &leg::Turn<T>, push: Vec3<T>) -> (Vec3<T>, Vec3<T>) {
+    let center = Vec3::lift(body.center);
+    let force =
+        inertial_force(body, push, turn.eps.cross(center) + turn.omega.cross(turn.omega.cross(center)));
+    (force, center.cross(force))
+}
+
+/// A rod, carried to the platform by the leg that leads it.
+#[inline(always)]
+pub(crate) fn carried_rod<T: Real>(
+    mech: &Mechanism<impl Constant<T>>,
+    rod: &Rod<impl Constant<T>>,
+    leader: &leg::State<T>,
+) -> Wrench<T> {
+    let about = rod_torque(mech, rod, leader);
+    // The rod's power is its torque about L times ω_L = n·δ'/|L×δ|, with δ' = (v_b - ℓ'δ)/ℓ and n square to δ.
+    let (p, f) = (&leader.position, &leader.frame);
+    Wrench::at(p.e, f.n() * (about / (f.sine * p.length)))
+}
+
 /// Torque of the rod's weight and inertia about its line [Eq. 36, 42].
 #[inline(always)]
-fn rod_torque<T: Real>(mech: &Mechanism, rod: &Rod, leader: &leg::State<T>) -> T {
+fn rod_torque<T: Real>(
+    mech: &Mechanism<impl Constant<T>>,
+    rod: &Rod<impl Constant<T>>,
+    leader: &leg::State<T>,
+) -> T {
     Vec3::lift(rod.axis).dot(rod_wrench(mech, rod, leader).torque)
 }
 
 /// The rod's weight and inertia as a wrench at its point, from its turn and its axes (L, n, L×n) [Eq. 36, 42].
 #[inline(always)]
-pub(crate) fn rod_wrench<T: Real>(mech: &Mechanism, rod: &Rod, leader: &leg::State<T>) -> Wrench<T> {
+pub(crate) fn rod_wrench<T: Real>(
+    mech: &Mechanism<impl Constant<T>>,
+    rod: &Rod<impl Constant<T>>,
+    leader: &leg::State<T>,
+) -> Wrench<T> {
     let (axis, n) = (Vec3::lift(rod.axis), leader.frame.n());
     let turn = leg::rod_turn(axis, leader);
     let (omega, eps) = (axis * turn.rate, axis * turn.acceleration);
@@ -92,14 +143,27 @@ pub(crate) fn rod_wrench<T: Real>(mech: &Mechanism, rod: &Rod, leader: &leg::Sta
     Wrench::new(force, center.cross(force) + inertial_torque(&rod.body, axes, omega, eps))
 }
 
+/// The platform's own term and the load, divided by the paper's efficiency η [Eq. 43].
+#[inline(always)]
+pub(crate) fn own_wrench<T: Real>(
+    mech: &Mechanism<impl Constant<T>>,
+    platform: &Motion<T>,
+    load: Wrench<T>,
+) -> Wrench<T> {
+    (load + platform_wrench(mech, platform)) * T::lit(1.0 / mech.efficiency)
+}
+
 /// All that the actuators and constraints must balance, as a wrench at o: the braces of [Eq. 43]. The paper's
 /// efficiency η divides the platform's term alone.
 #[inline(always)]
-pub fn resultant<T: Real>(mech: &Mechanism, platform: &Motion<T>, load: Wrench<T>) -> Wrench<T> {
-    let own = load + platform_wrench(mech, platform);
-    let mut sum = own * T::lit(1.0 / mech.efficiency);
+pub fn resultant<T: Real>(
+    mech: &Mechanism<impl Constant<T>>,
+    platform: &Motion<T>,
+    load: Wrench<T>,
+) -> Wrench<T> {
+    let mut sum = own_wrench(mech, platform, load);
     for (i, leg) in mech.legs.iter().enumerate() {
-        sum = sum + leg_wrench(mech, i, leg, platform);
+        sum = sum + leg_wrench(mech, i, leg, &leg::place(leg, &platform.pose), platform);
     }
     sum
 }
@@ -108,7 +172,7 @@ pub fn resultant<T: Real>(mech: &Mechanism, platform: &Motion<T>, load: Wrench<T
 /// `F_r = -J⁻ᵀ {...}` [Eq. 43], with the pivot ratio of J.
 #[inline(always)]
 pub fn inverse_dynamics<T: Real>(
-    mech: &Mechanism,
+    mech: &Mechanism<impl Constant<T>>,
     platform: &Motion<T>,
     load: Wrench<T>,
 ) -> ([T; 6], T::Value) {
@@ -117,21 +181,45 @@ pub fn inverse_dynamics<T: Real>(
 
 /// Active forces and multipliers that balance a wrench on the platform at o, with the pivot ratio of J \[T15\].
 #[inline(always)]
-pub fn balancing<T: Real>(mech: &Mechanism, pose: &Pose<T>, w: Wrench<T>) -> ([T; 6], T::Value) {
+pub fn balancing<T: Real>(
+    mech: &Mechanism<impl Constant<T>>,
+    pose: &Pose<T>,
+    w: Wrench<T>,
+) -> ([T; 6], T::Value) {
+    balanced(mech, transposed(&scaled_jacobian(mech, pose)), w)
+}
+
+/// The same with the transposed scaled Jacobian at hand.
+#[inline(always)]
+pub(crate) fn balanced<T: Real>(
+    mech: &Mechanism<impl Constant<T>>,
+    columns: Matrix6<T>,
+    w: Wrench<T>,
+) -> ([T; 6], T::Value) {
     let scaled = Wrench::new(w.force, w.torque * T::lit(1.0 / mech.characteristic_length));
-    let solved = solve(transposed(&scaled_jacobian(mech, pose)), scaled.array().map(|x| -x));
+    let mut rhs = scaled.array();
+    for x in &mut rhs {
+        *x = -*x;
+    }
+    let solved = solve(columns, rhs);
     (solved.x, solved.pivots)
 }
 
 #[inline(always)]
-fn transposed<T: Real>(m: &Matrix6<T>) -> Matrix6<T> {
-    std::array::from_fn(|i| std::array::from_fn(|j| m[j][i]))
+pub(crate) fn transposed<T: Real>(m: &Matrix6<T>) -> Matrix6<T> {
+    let mut transposed = *m;
+    for i in 0..6 {
+        for j in 0..6 {
+            transposed[i][j] = m[j][i];
+        }
+    }
+    transposed
 }
 
 /// Kinetic and potential energy of all links \[T17\]. Velocities only: with duals along the motion it
 /// gives the power of inertia and weight without the way that [`inverse_dynamics`] takes.
 #[inline(always)]
-pub fn energy<T: Real>(mech: &Mechanism, pose: &Pose<T>, twist: &Twist<T>) -> (T, T) {
+pub fn energy<T: Real>(mech: &Mechanism<impl Constant<T>>, pose: &Pose<T>, twist: &Twist<T>) -> (T, T) {
     let gravity = Vec3::lift(mech.gravity);
     let platform = Motion { pose: *pose, twist: *twist, acceleration: Acceleration::zero() };
     let link = |body: &Body, axes: Mat3<T>, omega: Vec3<T>, velocity: Vec3<T>, place: Vec3<T>| {
@@ -146,7 +234,7 @@ pub fn energy<T: Real>(mech: &Mechanism, pose: &Pose<T>, twist: &Twist<T>) -> (T
     let mut add = |(kinetic, potential): (T, T)| sum = (sum.0 + kinetic, sum.1 + potential);
     for (i, leg) in mech.legs.iter().enumerate() {
         let state = leg::state(leg, &platform);
-        let (axes, omega) = (state.frame.axes, state.turn.omega);
+        let (axes, omega) = (state.frame.axes, state.omega());
         let base = Vec3::lift(leg.base.point);
         let (piston, cylinder) = (leg::piston(leg, &state), leg::cylinder(leg, &state));
         add(link(&leg.piston, axes, omega, piston.velocity, base + state.position.r + piston.offset));
@@ -177,10 +265,10 @@ pub struct Coupled<T> {
 /// paper has c_3 = -c_1.
 #[inline(always)]
 pub fn coupled_forces<T: Real>(
-    mech: &Mechanism,
+    mech: &Mechanism<impl Constant<T>>,
     pair: [usize; 2],
-    axis: Vec3<f64>,
-    platform_axis: Vec3<f64>,
+    axis: Vec3<impl Constant<T>>,
+    platform_axis: Vec3<impl Constant<T>>,
     pose: &Pose<T>,
     f_c: T,
     as_printed: bool,

@@ -5,9 +5,9 @@
 
 use crate::constraint;
 use crate::coordinates::{self, MAX_COORDINATES, Set, Values};
-use crate::dynamics::{damping_wrench, resultant};
+use crate::dynamics::{damping_wrench, leg_wrench, own_wrench, resultant};
 use crate::leg;
-use crate::linear::solve;
+use crate::linear::{Solved, solve, solve_first};
 use crate::mechanism::{MAX_CONSTRAINTS, Mechanism};
 use crate::quadratic::quadratic;
 use crate::real::{Jet, Ordered, Real};
@@ -45,13 +45,20 @@ pub fn forward_dynamics<T: Real>(
 ) -> Driven<T> {
     let scale = mech.characteristic_length;
     let mut push = resultant(mech, &coasting(pose, twist), load);
-    for ((_, leg), &f) in mech.actuated().zip(forces) {
-        push = push + leg::row(&leg::position(leg, pose)) * f;
+    let mut count = 0;
+    for leg in &mech.legs {
+        if leg.actuated {
+            push = push + leg::row(&leg::position(leg, pose)) * forces[count];
+            count += 1;
+        }
     }
     // All in pure numbers: turns as arcs at Λ, masses by their mean, so that pivots compare.
     let arcs: [f64; 6] = std::array::from_fn(|i| if i < 3 { 1.0 } else { 1.0 / scale });
     let mass = mass_matrix(mech, pose);
-    let trace = (0..6).fold(T::zero(), |sum, i| sum + mass[i][i].scale(arcs[i] * arcs[i]));
+    let mut trace = T::zero();
+    for i in 0..6 {
+        trace = trace + mass[i][i].scale(arcs[i] * arcs[i]);
+    }
     let unit = T::lit(6.0) / trace;
     let (push, v) = (push.array(), twist.array());
 
@@ -63,11 +70,8 @@ pub fn forward_dynamics<T: Real>(
         }
         rhs[i] = (push[i] * unit).scale(arcs[i]);
     }
-    for k in 0..MAX_CONSTRAINTS {
-        let Some(c) = mech.independent.get(k) else {
-            m[6 + k][6 + k] = T::one();
-            continue;
-        };
+    for k in 0..mech.independent.len() {
+        let c = &mech.independent[k];
         let (size, row) = (constraint::length(c, scale), constraint::row(c, pose).array());
         for i in 0..6 {
             let entry = row[i].scale(size * arcs[i]);
@@ -75,15 +79,16 @@ pub fn forward_dynamics<T: Real>(
         }
         rhs[6 + k] = -quadratic(&constraint::hessian(c, pose), &v).scale(size);
     }
-    let solved = solve(m, rhs);
-    Driven {
-        acceleration: Acceleration::from_array(std::array::from_fn(|i| solved.x[i].scale(arcs[i]))),
-        multipliers: std::array::from_fn(|k| match mech.independent.get(k) {
-            Some(c) => (solved.x[6 + k] / unit).scale(constraint::length(c, scale)),
-            None => T::zero(),
-        }),
-        pivots: solved.pivots,
+    let Solved { x: [x], pivots, .. } = solve_first(m, [rhs], 6 + mech.independent.len());
+    let (mut acceleration, mut multipliers) = ([T::zero(); 6], [T::zero(); MAX_CONSTRAINTS]);
+    for i in 0..6 {
+        acceleration[i] = x[i].scale(arcs[i]);
     }
+    for k in 0..mech.independent.len() {
+        let c = &mech.independent[k];
+        multipliers[k] = (x[6 + k] / unit).scale(constraint::length(c, scale));
+    }
+    Driven { acceleration: Acceleration::from_array(acceleration), multipliers, pivots }
 }
 
 #[inline(always)]
@@ -95,14 +100,40 @@ fn coasting<T: Real>(pose: &Pose<T>, twist: &Twist<T>) -> Motion<T> {
 #[inline(always)]
 pub fn mass_matrix<T: Real>(mech: &Mechanism, pose: &Pose<T>) -> [[T; 6]; 6] {
     let still = coasting(pose, &Twist::zero());
-    let weight = resultant(mech, &still, Wrench::zero());
-    let columns: [[T; 6]; 6] = std::array::from_fn(|j| inertia(mech, &still, weight, &unit(j)).array());
-    std::array::from_fn(|i| std::array::from_fn(|j| columns[j][i]))
+    let mut columns = [Wrench::zero(); 6];
+    let weight = own_wrench(mech, &still, Wrench::zero());
+    for j in 0..6 {
+        columns[j] = weight - own_wrench(mech, &accelerated(&still, j), Wrench::zero());
+    }
+    for (i, leg) in mech.legs.iter().enumerate() {
+        let place = leg::place(leg, pose);
+        let weight = leg_wrench(mech, i, leg, &place, &still);
+        for j in 0..6 {
+            columns[j] = columns[j] + weight - leg_wrench(mech, i, leg, &place, &accelerated(&still, j));
+        }
+    }
+    let mut m = [[T::zero(); 6]; 6];
+    for j in 0..6 {
+        let column = columns[j].array();
+        for i in 0..6 {
+            m[i][j] = column[i];
+        }
+    }
+    m
 }
 
 #[inline(always)]
 fn unit<T: Real>(j: usize) -> Twist<T> {
-    Twist::from_array(std::array::from_fn(|i| if i == j { T::one() } else { T::zero() }))
+    let mut unit = [T::zero(); 6];
+    unit[j] = T::one();
+    Twist::from_array(unit)
+}
+
+/// At rest with the unit of one acceleration.
+#[inline(always)]
+fn accelerated<T: Real>(still: &Motion<T>, j: usize) -> Motion<T> {
+    let Twist { v, omega } = unit(j);
+    Motion { acceleration: Acceleration::new(v, omega), ..*still }
 }
 
 /// `M A` for the acceleration with the numbers of a twist; `weight` is the resultant at rest.
@@ -246,7 +277,7 @@ fn equations<T: Real>(
 
 /// Size of a twist squared, turns counted as arcs.
 #[inline(always)]
-fn square<T: Real>(mech: &Mechanism, twist: &Twist<T>) -> T {
+pub(crate) fn square<T: Real>(mech: &Mechanism, twist: &Twist<T>) -> T {
     let scale = mech.characteristic_length;
     twist.v.dot(twist.v) + twist.omega.dot(twist.omega).scale(scale * scale)
 }

@@ -2,6 +2,8 @@
 //! coefficients are the forces of unit parameters \[T57\].
 
 use crate::dynamics;
+use crate::jacobian::scaled_jacobian;
+use crate::leg;
 use crate::mechanism::{Body, Leg, Mechanism, Turning};
 use crate::real::{Dual, Real};
 use crate::spatial::{Mat3, Motion, Vec3, Wrench};
@@ -190,20 +192,34 @@ impl Regressor {
 
     /// For each parameter the active forces and multipliers that its unit asks for: a column of Y \[T57\].
     pub fn columns(&mut self, platform: &Motion<f64>) -> Vec<[f64; 6]> {
+        let legs: Vec<_> = self.bare.legs.iter().map(|leg| leg::state(leg, platform)).collect();
+        let jacobian = dynamics::transposed(&scaled_jacobian(&self.bare, &platform.pose));
         let mut columns = Vec::with_capacity(self.parameters.len());
-        for p in self.parameters.clone() {
-            let wrenches = p.numbers.iter().map(|&k| self.wrench(p.link, k, platform));
+        for i in 0..self.parameters.len() {
+            let p = self.parameters[i];
+            let wrenches = p.numbers.iter().map(|&k| self.wrench(p.link, k, platform, &legs));
             let wrench = wrenches.fold(Wrench::zero(), |sum, w| sum + w);
-            columns.push(dynamics::balancing(&self.bare, &platform.pose, wrench).0);
+            columns.push(dynamics::balanced(&self.bare, jacobian, wrench).0);
         }
         columns
     }
 
-    /// What the unit of a standard parameter puts on the platform.
-    fn wrench(&mut self, link: Link, number: usize, platform: &Motion<f64>) -> Wrench<f64> {
+    /// What the unit of a standard parameter puts on the platform, its link being the only one with a body.
+    fn wrench(
+        &mut self,
+        link: Link,
+        number: usize,
+        platform: &Motion<f64>,
+        legs: &[leg::State<f64>],
+    ) -> Wrench<f64> {
         let mut of = |number: usize| {
             *body_mut(&mut self.bare, link) = unit_body(number);
-            let wrench = dynamics::resultant(&self.bare, platform, Wrench::zero());
+            let mech = &self.bare;
+            let wrench = match link {
+                Link::Platform => dynamics::own_wrench(mech, platform, Wrench::zero()),
+                Link::Cylinder(i) | Link::Piston(i) => dynamics::links_wrench(mech, &mech.legs[i], &legs[i]),
+                Link::Rod(i) => dynamics::carried_rod(mech, &mech.rods[i], &legs[mech.rods[i].leader]),
+            };
             *body_mut(&mut self.bare, link) = no_body();
             wrench
         };

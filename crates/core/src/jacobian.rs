@@ -6,53 +6,78 @@ use crate::leg;
 use crate::linear::solve;
 use crate::mechanism::Mechanism;
 use crate::quadratic::{Hessian, quadratic};
-use crate::real::Real;
-use crate::spatial::{Acceleration, Pose, Twist, Wrench};
+use crate::real::{Constant, Real};
+use crate::spatial::{Acceleration, Pose, Twist};
 
 pub type Matrix6<T> = [[T; 6]; 6];
 
 /// J of `J V = (ℓ', 0)`, its rows (δ, e×δ) and (c, τ) [Eq. 13].
 #[inline(always)]
-pub fn jacobian<T: Real>(mech: &Mechanism, pose: &Pose<T>) -> Matrix6<T> {
-    let mut rows = [Wrench::zero(); 6];
-    let legs = mech.actuated().map(|(_, leg)| leg::row(&leg::position(leg, pose)));
-    let constraints = mech.independent.iter().map(|c| constraint::row(c, pose));
-    for (row, wrench) in rows.iter_mut().zip(legs.chain(constraints)) {
-        *row = wrench;
+pub fn jacobian<T: Real>(mech: &Mechanism<impl Constant<T>>, pose: &Pose<T>) -> Matrix6<T> {
+    let mut rows = [[T::zero(); 6]; 6];
+    let mut count = 0;
+    for leg in &mech.legs {
+        if leg.actuated {
+            rows[count] = leg::row(&leg::position(leg, pose)).array();
+            count += 1;
+        }
     }
-    rows.map(Wrench::array)
+    for c in &mech.independent {
+        rows[count] = constraint::row(c, pose).array();
+        count += 1;
+    }
+    rows
 }
 
 /// J with its torque columns divided by the characteristic length: pure numbers, so that a pivot ratio means the
 /// same for every size of machine. It belongs to the twist (v, Λω).
 #[inline(always)]
-pub fn scaled_jacobian<T: Real>(mech: &Mechanism, pose: &Pose<T>) -> Matrix6<T> {
+pub fn scaled_jacobian<T: Real>(mech: &Mechanism<impl Constant<T>>, pose: &Pose<T>) -> Matrix6<T> {
     let inverse = T::lit(1.0 / mech.characteristic_length);
-    jacobian(mech, pose).map(|row| std::array::from_fn(|j| if j < 3 { row[j] } else { row[j] * inverse }))
+    let mut rows = jacobian(mech, pose);
+    for i in 0..6 {
+        for j in 3..6 {
+            rows[i][j] = rows[i][j] * inverse;
+        }
+    }
+    rows
 }
 
 /// A solution (v, Λω) as (v, ω).
 #[inline(always)]
-fn unscaled<T: Real>(mech: &Mechanism, x: [T; 6]) -> [T; 6] {
+fn unscaled<T: Real>(mech: &Mechanism<impl Constant<T>>, mut x: [T; 6]) -> [T; 6] {
     let inverse = T::lit(1.0 / mech.characteristic_length);
-    std::array::from_fn(|j| if j < 3 { x[j] } else { x[j] * inverse })
+    for i in 3..6 {
+        x[i] = x[i] * inverse;
+    }
+    x
 }
 
 /// H of `J A + Vᵀ H V = (ℓ'', 0)`, one symmetric 6×6 layer for each row of J [Eq. 19].
 #[inline(always)]
-pub fn hessian<T: Real>(mech: &Mechanism, pose: &Pose<T>) -> [Hessian<T>; 6] {
+pub fn hessian<T: Real>(mech: &Mechanism<impl Constant<T>>, pose: &Pose<T>) -> [Hessian<T>; 6] {
     let mut layers = [[[T::zero(); 6]; 6]; 6];
-    let legs = mech.actuated().map(|(_, leg)| leg::hessian(&leg::position(leg, pose)));
-    let constraints = mech.independent.iter().map(|c| constraint::hessian(c, pose));
-    for (layer, h) in layers.iter_mut().zip(legs.chain(constraints)) {
-        *layer = h;
+    let mut count = 0;
+    for leg in &mech.legs {
+        if leg.actuated {
+            layers[count] = leg::hessian(&leg::position(leg, pose));
+            count += 1;
+        }
+    }
+    for c in &mech.independent {
+        layers[count] = constraint::hessian(c, pose);
+        count += 1;
     }
     layers
 }
 
 /// The platform's twist from the rates of the actuated legs, and the pivot ratio of J [Eq. 13].
 #[inline(always)]
-pub fn platform_twist<T: Real>(mech: &Mechanism, pose: &Pose<T>, rates: &[T]) -> (Twist<T>, T::Value) {
+pub fn platform_twist<T: Real>(
+    mech: &Mechanism<impl Constant<T>>,
+    pose: &Pose<T>,
+    rates: &[T],
+) -> (Twist<T>, T::Value) {
     let solved = solve(scaled_jacobian(mech, pose), padded(rates));
     (Twist::from_array(unscaled(mech, solved.x)), solved.pivots)
 }
@@ -60,15 +85,16 @@ pub fn platform_twist<T: Real>(mech: &Mechanism, pose: &Pose<T>, rates: &[T]) ->
 /// The platform's acceleration from those of the actuated legs: `A = J⁻¹ (ℓ'' - Vᵀ H V)` [Eq. 19].
 #[inline(always)]
 pub fn platform_acceleration<T: Real>(
-    mech: &Mechanism,
+    mech: &Mechanism<impl Constant<T>>,
     pose: &Pose<T>,
     twist: &Twist<T>,
     accelerations: &[T],
 ) -> (Acceleration<T>, T::Value) {
     let mut rhs = padded(accelerations);
     let v = twist.array();
-    for (entry, h) in rhs.iter_mut().zip(hessian(mech, pose)) {
-        *entry = *entry - quadratic(&h, &v);
+    let layers = hessian(mech, pose);
+    for i in 0..6 {
+        rhs[i] = rhs[i] - quadratic(&layers[i], &v);
     }
     let solved = solve(scaled_jacobian(mech, pose), rhs);
     (Acceleration::from_array(unscaled(mech, solved.x)), solved.pivots)
@@ -76,5 +102,7 @@ pub fn platform_acceleration<T: Real>(
 
 #[inline(always)]
 fn padded<T: Real>(values: &[T]) -> [T; 6] {
-    std::array::from_fn(|i| values.get(i).copied().unwrap_or_else(T::zero))
+    let mut padded = [T::zero(); 6];
+    padded[..values.len()].copy_from_slice(values);
+    padded
 }

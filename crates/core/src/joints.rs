@@ -5,17 +5,17 @@
 
 use crate::leg::{self, State};
 use crate::mechanism::{Joint, Leg, Mechanism, Side};
-use crate::real::Trig;
+use crate::real::{Real, Trig};
 use crate::spatial::{Mat3, Motion, Pose, Vec3};
 use crate::spec::JointKind;
 
 /// Angles and rates of one joint: U has both (about the axis in the body, then about n), R the first, others none.
 #[derive(Clone, Copy, Debug)]
-pub struct JointAngles {
-    pub angles: [f64; 2],
-    pub rates: [f64; 2],
+pub struct JointAngles<T> {
+    pub angles: [T; 2],
+    pub rates: [T; 2],
     /// Angle between the leg and the joint's cone axis.
-    pub cone: f64,
+    pub cone: T,
 }
 
 /// A leg's normal n and direction δ at the home pose, in base axes and in platform axes: where angles are zero.
@@ -36,24 +36,34 @@ impl Zero {
 }
 
 /// Base joint and platform joint of a leg.
-#[must_use]
-pub fn angles(leg: &Leg, zero: &Zero, platform: &Motion<f64>, state: &State<f64>) -> [JointAngles; 2] {
-    let (n, delta, omega) = (state.frame.n(), state.position.delta, state.turn.omega);
+#[inline(always)]
+pub fn angles<T: Trig>(
+    leg: &Leg,
+    zero: &Zero,
+    platform: &Motion<T>,
+    state: &State<T>,
+) -> [JointAngles<T>; 2] {
+    let (n, delta, omega) = (state.frame.n(), state.position.delta, state.omega());
     let rotation = &platform.pose.rotation;
-    let at = |side, joint: &Joint, body: &Mat3<f64>, omega: Vec3<f64>| JointAngles {
-        angles: angles_at(leg, side, zero, rotation, n, delta),
-        rates: rates(joint, body, n, omega),
-        cone: cone_angle(joint, body.transpose_mul(delta)),
-    };
     // Seen from the leg the platform turns the other way.
+    let outer = platform.twist.omega - omega;
     [
-        at(Side::Base, &leg.base, &Mat3::identity(), omega),
-        at(Side::Platform, &leg.platform, rotation, platform.twist.omega - omega),
+        JointAngles {
+            angles: angles_at(leg, Side::Base, zero, rotation, n, delta),
+            rates: rates(&leg.base, &Mat3::identity(), n, omega),
+            cone: cone_angle(&leg.base, delta),
+        },
+        JointAngles {
+            angles: angles_at(leg, Side::Platform, zero, rotation, n, delta),
+            rates: rates(&leg.platform, rotation, n, outer),
+            cone: cone_angle(&leg.platform, rotation.transpose_mul(delta)),
+        },
     ]
 }
 
 /// Angles of one joint of a leg with the normal `n` and the direction `delta`, given in base axes; `rotation` is
 /// the platform's. NaN where the joint has none.
+#[inline(always)]
 pub fn angles_at<T: Trig>(
     leg: &Leg,
     side: Side,
@@ -79,28 +89,32 @@ pub fn angles_at<T: Trig>(
     match side {
         Side::Base => angles,
         // Seen from the leg the platform turns the other way.
-        Side::Platform => angles.map(|a| -a),
+        Side::Platform => [-angles[0], -angles[1]],
     }
 }
 
 /// Rates of the angles of a joint whose outer link turns at `omega` against the inner one; `body` are the axes that
 /// the joint's own axis is given in.
-fn rates(joint: &Joint, body: &Mat3<f64>, n: Vec3<f64>, omega: Vec3<f64>) -> [f64; 2] {
+#[inline(always)]
+fn rates<T: Real>(joint: &Joint, body: &Mat3<T>, n: Vec3<T>, omega: Vec3<T>) -> [T; 2] {
+    let none = T::lit(f64::NAN);
     match (joint.kind, joint.axis) {
-        (JointKind::Universal, Some(u)) => [omega.dot(*body * u), omega.dot(n)],
-        (JointKind::Revolute, Some(u)) => [omega.dot(*body * u), f64::NAN],
-        _ => [f64::NAN; 2],
+        (JointKind::Universal, Some(u)) => [omega.dot(body.of(u)), omega.dot(n)],
+        (JointKind::Revolute, Some(u)) => [omega.dot(body.of(u)), none],
+        _ => [none; 2],
     }
 }
 
 /// The angle between the joint's cone axis and the leg's direction, both in the axes of the body.
 #[must_use]
+#[inline(always)]
 pub fn cone_angle<T: Trig>(joint: &Joint, delta: Vec3<T>) -> T {
     let axis = Vec3::lift(joint.cone_axis);
     axis.cross(delta).norm().atan2(axis.dot(delta))
 }
 
 /// The turn about `axis` that takes `from` to `to`.
+#[inline(always)]
 fn about<T: Trig>(axis: Vec3<f64>, from: Vec3<f64>, to: Vec3<T>) -> T {
     let side = Vec3::lift(axis.cross(from));
     let along = to.dot(Vec3::lift(from)) - Vec3::lift(axis).dot(to) * T::lit(axis.dot(from));
@@ -108,12 +122,14 @@ fn about<T: Trig>(axis: Vec3<f64>, from: Vec3<f64>, to: Vec3<T>) -> T {
 }
 
 /// The angle of a leg about its normal, from the axis of its universal joint.
+#[inline(always)]
 fn swing<T: Trig>(axis: Vec3<f64>, delta: Vec3<T>, n: Vec3<T>) -> T {
     let axis = Vec3::lift(axis);
     delta.dot(n.cross(axis)).atan2(delta.dot(axis))
 }
 
 /// The angle of the same direction within a half turn of zero.
+#[inline(always)]
 pub(crate) fn wrapped<T: Trig>(angle: T) -> T {
     let (s, c) = angle.sin_cos();
     s.atan2(c)
@@ -121,6 +137,7 @@ pub(crate) fn wrapped<T: Trig>(angle: T) -> T {
 
 /// The turn of each rod about its line since the home pose; `n` is the normal of the leg that leads it.
 #[must_use]
+#[inline(always)]
 pub fn rod_angle<T: Trig>(mech: &Mechanism, rod: usize, zero: &Zero, n: Vec3<T>) -> T {
     about(mech.rods[rod].axis, zero.base.0, n)
 }

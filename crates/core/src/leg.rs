@@ -2,7 +2,7 @@
 
 use crate::mechanism::{Leg, Side, Turning};
 use crate::quadratic::{Hessian, add_centripetal, point_columns};
-use crate::real::{Ordered, Real};
+use crate::real::{Constant, Ordered, Real};
 use crate::spatial::{Mat3, Motion, Pose, Vec3, Wrench};
 
 /// Where the leg is, base axes \[T1\].
@@ -19,14 +19,14 @@ pub struct Position<T> {
 
 /// e from o to b and r from B to b.
 #[inline(always)]
-pub fn vectors<T: Real>(leg: &Leg, pose: &Pose<T>) -> (Vec3<T>, Vec3<T>) {
+pub fn vectors<T: Real>(leg: &Leg<impl Constant<T>>, pose: &Pose<T>) -> (Vec3<T>, Vec3<T>) {
     let e = pose.rotation.of(leg.platform.point);
     (e, pose.o + e - Vec3::lift(leg.base.point))
 }
 
 /// [Eq. 2, 3] \[T1\] `e = R m, b = o + e, r = b - B, δ = r/ℓ`.
 #[inline(always)]
-pub fn position<T: Real>(leg: &Leg, pose: &Pose<T>) -> Position<T> {
+pub fn position<T: Real>(leg: &Leg<impl Constant<T>>, pose: &Pose<T>) -> Position<T> {
     let (e, r) = vectors(leg, pose);
     let length = r.norm();
     Position { e, r, length, delta: r * (T::one() / length) }
@@ -45,7 +45,10 @@ pub fn hessian<T: Real>(p: &Position<T>) -> Hessian<T> {
     let mut h = [[T::zero(); 6]; 6];
     add_centripetal(&mut h, p.e, p.delta);
     let inverse = T::one() / p.length;
-    let columns = point_columns(p.e).map(|v| v - p.delta * p.delta.dot(v));
+    let mut columns = point_columns(p.e);
+    for v in &mut columns {
+        *v = *v - p.delta * p.delta.dot(*v);
+    }
     for i in 0..6 {
         for j in 0..6 {
             h[i][j] = columns[i].dot(columns[j]).mul_add(inverse, h[i][j]);
@@ -54,37 +57,9 @@ pub fn hessian<T: Real>(p: &Position<T>) -> Hessian<T> {
     h
 }
 
-/// How the platform end moves, and with it the leg's length and direction \[T2\]-\[T4\].
-#[derive(Clone, Copy, Debug)]
-pub struct End<T> {
-    pub v_b: Vec3<T>,
-    pub a_b: Vec3<T>,
-    pub rate: T,
-    pub acceleration: T,
-    pub delta_rate: Vec3<T>,
-    pub delta_acceleration: Vec3<T>,
-}
-
-#[inline(always)]
-pub fn end<T: Real>(p: &Position<T>, platform: &Motion<T>) -> End<T> {
-    let Motion { twist, acceleration, .. } = platform;
-    let (omega, e, delta, inverse) = (twist.omega, p.e, p.delta, T::one() / p.length);
-    // [Eq. 20] [T2] v_b = v + ω×e;  [Eq. 34] a_b = a + ε×e + ω×(ω×e)
-    let spin_e = omega.cross(e);
-    let v_b = twist.v + spin_e;
-    let a_b = acceleration.a + acceleration.eps.cross(e) + omega.cross(spin_e);
-    // [Eq. 6] [T3] ℓ' = δ·v_b;  δ' = (v_b - ℓ'δ)/ℓ
-    let rate = delta.dot(v_b);
-    let delta_rate = (v_b - delta * rate) * inverse;
-    // [Eq. 15] [T4] ℓ'' = δ·a_b + v_b·δ';  δ'' = (a_b - ℓ''δ - 2ℓ'δ')/ℓ
-    let second = delta.dot(a_b) + v_b.dot(delta_rate);
-    let delta_acceleration = (a_b - delta * second - delta_rate * (rate + rate)) * inverse;
-    End { v_b, a_b, rate, acceleration: second, delta_rate, delta_acceleration }
-}
-
 /// The unit axis behind a leg's frame in base axes, and whether it turns with the platform.
 #[inline(always)]
-fn turning_axis<T: Real>(turning: Turning, pose: &Pose<T>) -> (Vec3<T>, bool) {
+pub(crate) fn turning_axis<T: Real>(turning: Turning<impl Constant<T>>, pose: &Pose<T>) -> (Vec3<T>, bool) {
     match turning {
         Turning::Across(Side::Platform, u) | Turning::Along(Side::Platform, u) => {
             (pose.rotation * Vec3::lift(u), true)
@@ -98,14 +73,12 @@ fn turning_axis<T: Real>(turning: Turning, pose: &Pose<T>) -> (Vec3<T>, bool) {
 /// The leg's frame at a pose, and what the spin needs of it \[T5\].
 #[derive(Clone, Copy, Debug)]
 pub struct Frame<T> {
-    /// Columns n, δ, n×δ.
+    /// Columns n, δ, m = n×δ.
     pub axes: Mat3<T>,
-    /// The axis u behind n, base axes.
-    pub u: Vec3<T>,
     /// |u×δ|: zero where a U joint's axis lies along the leg, one for an R or F joint.
     pub sine: T,
-    /// w with `s = N'·w` for the vector N = |N| n; zero for a leg that spins freely.
-    pub w: Vec3<T>,
+    /// κ = u·δ/|u×δ| of a U joint: how much the leg spins as it swings; zero for other joints.
+    pub slope: T,
 }
 
 impl<T: Real> Frame<T> {
@@ -117,7 +90,7 @@ impl<T: Real> Frame<T> {
 
 /// [T5] `n = (u×δ)/|u×δ|` for a U joint, `n = u` for R and F.
 #[inline(always)]
-pub fn frame<T: Real>(leg: &Leg, pose: &Pose<T>, p: &Position<T>) -> Frame<T> {
+pub fn frame<T: Real>(leg: &Leg<impl Constant<T>>, pose: &Pose<T>, p: &Position<T>) -> Frame<T> {
     let (u, _) = turning_axis(leg.turning, pose);
     let normal = match leg.turning {
         Turning::Across(..) => u.cross(p.delta),
@@ -132,11 +105,43 @@ pub fn frame<T: Real>(leg: &Leg, pose: &Pose<T>, p: &Position<T>) -> Frame<T> {
     let sine = normal.norm();
     let inverse = T::one() / sine;
     let n = normal * inverse;
-    let w = match leg.turning {
-        Turning::Free(_) => Vec3::zero(),
-        Turning::Across(..) | Turning::Along(..) => p.delta.cross(n) * inverse,
+    let slope = match leg.turning {
+        Turning::Across(..) => u.dot(p.delta) * inverse,
+        Turning::Along(..) | Turning::Free(_) => T::zero(),
     };
-    Frame { axes: Mat3::from_columns(n, p.delta, n.cross(p.delta)), u, sine, w }
+    Frame { axes: Mat3::from_columns(n, p.delta, n.cross(p.delta)), sine, slope }
+}
+
+/// How the platform end moves, and with it the leg's length and direction \[T2\]-\[T4\].
+#[derive(Clone, Copy, Debug)]
+pub struct End<T> {
+    /// Base axes.
+    pub v_b: Vec3<T>,
+    pub a_b: Vec3<T>,
+    pub rate: T,
+    pub acceleration: T,
+    /// δ' along n and m.
+    pub delta_rate: [T; 2],
+    /// δ'' along n and m; along δ it is -|δ'|².
+    pub delta_acceleration: [T; 2],
+}
+
+#[inline(always)]
+pub fn end<T: Real>(p: &Position<T>, f: &Frame<T>, platform: &Motion<T>) -> End<T> {
+    let Motion { twist, acceleration, .. } = platform;
+    let (omega, e, inverse) = (twist.omega, p.e, T::one() / p.length);
+    // [Eq. 20] [T2] v_b = v + ω×e;  [Eq. 34] a_b = a + ε×e + ω×(ω×e)
+    let spin_e = omega.cross(e);
+    let v_b = twist.v + spin_e;
+    let a_b = acceleration.a + acceleration.eps.cross(e) + omega.cross(spin_e);
+    // In the leg's axes: [Eq. 6] [T3] ℓ' = δ·v_b;  δ' = (v_b - ℓ'δ)/ℓ
+    let (v, a) = (f.axes.transpose_mul(v_b), f.axes.transpose_mul(a_b));
+    let rate = [v.x * inverse, v.z * inverse];
+    // [Eq. 15] [T4] ℓ'' = δ·a_b + v_b·δ';  δ'' = (a_b - ℓ''δ - 2ℓ'δ')/ℓ
+    let second = v.x.mul_add(rate[0], v.z.mul_add(rate[1], a.y));
+    let twice = v.y + v.y;
+    let delta_acceleration = [(a.x - twice * rate[0]) * inverse, (a.z - twice * rate[1]) * inverse];
+    End { v_b, a_b, rate: v.y, acceleration: second, delta_rate: rate, delta_acceleration }
 }
 
 /// How the leg turns \[T6\].
@@ -144,6 +149,7 @@ pub fn frame<T: Real>(leg: &Leg, pose: &Pose<T>, p: &Position<T>) -> Frame<T> {
 pub struct Turn<T> {
     pub spin: T,
     pub spin_rate: T,
+    /// Angular velocity and acceleration along n, δ, m.
     pub omega: Vec3<T>,
     pub eps: Vec3<T>,
 }
@@ -151,46 +157,40 @@ pub struct Turn<T> {
 /// The leg's angular velocity and acceleration: with u = L [Eq. 22-28], with u = -e/|e| on the platform [Eq. 29-35].
 #[inline(always)]
 pub fn turn<T: Real>(
-    leg: &Leg,
+    leg: &Leg<impl Constant<T>>,
     platform: &Motion<T>,
-    p: &Position<T>,
     end: &End<T>,
     f: &Frame<T>,
 ) -> Turn<T> {
-    let Motion { pose, twist, acceleration } = platform;
-    let (u, moves) = turning_axis(leg.turning, pose);
-    // u' = ω_u × u, u'' = ε_u × u + ω_u × u', with ω_u that of the body u is fixed in
-    let (u1, u2) = if moves {
-        let u1 = twist.omega.cross(u);
-        (u1, acceleration.eps.cross(u) + twist.omega.cross(u1))
-    } else {
-        (Vec3::zero(), Vec3::zero())
-    };
-    // N = |N| n and its first two rates
-    let (normal1, normal2) = match leg.turning {
-        Turning::Across(..) => {
-            let mixed = u1.cross(end.delta_rate);
-            (
-                u1.cross(p.delta) + u.cross(end.delta_rate),
-                u2.cross(p.delta) + mixed + mixed + u.cross(end.delta_acceleration),
-            )
+    let ([a, b], [a1, b1]) = (end.delta_rate, end.delta_acceleration);
+    let (spin, spin_rate) = match leg.turning {
+        Turning::Free(_) => (T::zero(), T::zero()),
+        Turning::Across(Side::Base, _) | Turning::Along(Side::Base, _) => spin(f.slope, a, b, a1),
+        Turning::Across(Side::Platform, _) | Turning::Along(Side::Platform, _) => {
+            let omega = f.axes.transpose_mul(platform.twist.omega);
+            let eps = f.axes.transpose_mul(platform.acceleration.eps);
+            // As the platform sees it: δ' - ω×δ, and δ'' - ε×δ - ω×(ω×δ) - 2ω×(δ' - ω×δ) along n
+            let (a, b) = (a + omega.z, b - omega.x);
+            let a1 = a1 + eps.z - omega.y * (omega.x + b + b);
+            let (s, s1) = spin(f.slope, a, b, a1);
+            // The platform's turn about δ, and its rate, come on top.
+            (omega.y + s, eps.y + omega.x.mul_add(a, omega.z * b) + s1)
         }
-        Turning::Along(..) => (u1, u2),
-        Turning::Free(_) => (Vec3::zero(), Vec3::zero()),
     };
-    // [T6] s = N'·w with w = δ×N/|N|²;  s' = (N''·(δ×N) + N'·(δ'×N))/|N|² - 2 s (N·N')/|N|²
-    let inverse = T::one() / f.sine;
-    let spin = normal1.dot(f.w);
-    let stretch = f.n().dot(normal1) * inverse;
-    let spin_rate =
-        normal2.dot(f.w) + normal1.dot(end.delta_rate.cross(f.n())) * inverse - (spin + spin) * stretch;
     // [T6] ω = δ×δ' + sδ;  ε = δ×δ'' + s'δ + sδ'
     Turn {
         spin,
         spin_rate,
-        omega: p.delta.cross(end.delta_rate) + p.delta * spin,
-        eps: p.delta.cross(end.delta_acceleration) + p.delta * spin_rate + end.delta_rate * spin,
+        omega: Vec3::new(b, spin, -a),
+        eps: Vec3::new(spin.mul_add(a, b1), spin_rate, spin.mul_add(b, -a1)),
     }
+}
+
+/// [T6] `s = κa`, `s' = κ(a₁ - 2bs) - ab` for δ' = (a, b) and δ'' = (a₁, ·) along n and m, seen from the body of u.
+#[inline(always)]
+fn spin<T: Real>(slope: T, a: T, b: T, a1: T) -> (T, T) {
+    let s = slope * a;
+    (s, slope * (a1 - (b + b) * s) - a * b)
 }
 
 /// All of a leg at an instant.
@@ -202,32 +202,67 @@ pub struct State<T> {
     pub turn: Turn<T>,
 }
 
+impl<T: Real> State<T> {
+    /// Angular velocity, base axes.
+    #[inline(always)]
+    pub fn omega(&self) -> Vec3<T> {
+        self.frame.axes * self.turn.omega
+    }
+
+    /// Angular acceleration, base axes.
+    #[inline(always)]
+    pub fn eps(&self) -> Vec3<T> {
+        self.frame.axes * self.turn.eps
+    }
+}
+
+/// Where a leg is at a pose, however that moves.
+pub type Place<T> = (Position<T>, Frame<T>);
+
 #[inline(always)]
-pub fn state<T: Real>(leg: &Leg, platform: &Motion<T>) -> State<T> {
-    let position = position(leg, &platform.pose);
-    let end = end(&position, platform);
-    let frame = frame(leg, &platform.pose, &position);
-    let turn = turn(leg, platform, &position, &end, &frame);
+pub fn place<T: Real>(leg: &Leg<impl Constant<T>>, pose: &Pose<T>) -> Place<T> {
+    let position = position(leg, pose);
+    (position, frame(leg, pose, &position))
+}
+
+/// A leg that is there when the platform moves.
+#[inline(always)]
+pub fn moving<T: Real>(
+    leg: &Leg<impl Constant<T>>,
+    &(position, frame): &Place<T>,
+    platform: &Motion<T>,
+) -> State<T> {
+    let end = end(&position, &frame, platform);
+    let turn = turn(leg, platform, &end, &frame);
     State { position, end, frame, turn }
 }
 
-/// Carries a force F at b and a torque M on the leg to the platform: `F·v_b + M·ω_leg` as a wrench at o \[T14\].
 #[inline(always)]
-pub fn carry<T: Real>(leg: &Leg, state: &State<T>, force: Vec3<T>, torque: Vec3<T>) -> Wrench<T> {
+pub fn state<T: Real>(leg: &Leg<impl Constant<T>>, platform: &Motion<T>) -> State<T> {
+    moving(leg, &place(leg, &platform.pose), platform)
+}
+
+/// Carries a force F at b and a torque M on the leg, both along n, δ, m, to the platform: `F·v_b + M·ω_leg` as a wrench
+/// at o \[T14\].
+#[inline(always)]
+pub fn carry<T: Real>(
+    leg: &Leg<impl Constant<T>>,
+    state: &State<T>,
+    force: Vec3<T>,
+    torque: Vec3<T>,
+) -> Wrench<T> {
     let State { position: p, frame: f, .. } = state;
-    // M·ω_leg = (M×δ)·δ' + (M·δ) s, and s = N'·w is linear in δ' (through u×δ') and in ω_u (through u').
-    let about = torque.dot(p.delta);
-    let (direction, turning) = match leg.turning {
-        Turning::Across(side, _) => (f.w.cross(f.u) * about, (side, f.u.cross(p.delta.cross(f.w)) * about)),
-        Turning::Along(side, _) => (Vec3::zero(), (side, f.u.cross(f.w) * about)),
-        Turning::Free(_) => (Vec3::zero(), (Side::Base, Vec3::zero())),
-    };
-    let conjugate = torque.cross(p.delta) + direction;
-    let across = conjugate - p.delta * p.delta.dot(conjugate);
-    let wrench = Wrench::at(p.e, force + across * (T::one() / p.length));
-    match turning {
-        (Side::Platform, couple) => wrench + Wrench::new(Vec3::zero(), couple),
-        (Side::Base, _) => wrench,
+    let (inverse, [_, delta, m]) = (T::one() / p.length, f.axes.0);
+    // M·ω = (M×δ)·δ' + (M·δ) s, and δ' = (v_b - ℓ'δ)/ℓ
+    let along_n = f.slope.mul_add(torque.y, -torque.z).mul_add(inverse, force.x);
+    let along_m = torque.x.mul_add(inverse, force.z);
+    let wrench = Wrench::at(p.e, f.axes * Vec3::new(along_n, force.y, along_m));
+    match leg.turning {
+        // s = κ n·(δ' - ω×δ) + ω·δ
+        Turning::Across(Side::Platform, _) | Turning::Along(Side::Platform, _) => {
+            wrench + Wrench::new(Vec3::zero(), (delta + m * f.slope) * torque.y)
+        }
+        _ => wrench,
     }
 }
 
@@ -241,31 +276,30 @@ pub struct PointMotion<T> {
 
 #[inline(always)]
 fn point_motion<T: Real>(
-    turn: &Turn<T>,
-    offset: Vec3<T>,
+    state: &State<T>,
+    center: Vec3<f64>,
     velocity: Vec3<T>,
     acceleration: Vec3<T>,
 ) -> PointMotion<T> {
-    let spin = turn.omega.cross(offset);
+    let (axes, Turn { omega, eps, .. }, center) = (state.frame.axes, state.turn, Vec3::lift(center));
+    let spin = omega.cross(center);
     PointMotion {
-        offset,
-        velocity: velocity + spin,
-        acceleration: acceleration + turn.eps.cross(offset) + turn.omega.cross(spin),
+        offset: axes * center,
+        velocity: velocity + axes * spin,
+        acceleration: acceleration + axes * (eps.cross(center) + omega.cross(spin)),
     }
 }
 
 /// The piston's mass centre, offset from b [Eq. 38, 39] \[T8\].
 #[inline(always)]
-pub fn piston<T: Real>(leg: &Leg, state: &State<T>) -> PointMotion<T> {
-    let offset = state.frame.axes * Vec3::lift(leg.piston.center);
-    point_motion(&state.turn, offset, state.end.v_b, state.end.a_b)
+pub fn piston<T: Real>(leg: &Leg<impl Constant<T>>, state: &State<T>) -> PointMotion<T> {
+    point_motion(state, leg.piston.center, state.end.v_b, state.end.a_b)
 }
 
 /// The cylinder's mass centre, offset from B [Eq. 38, 39] \[T8\].
 #[inline(always)]
-pub fn cylinder<T: Real>(leg: &Leg, state: &State<T>) -> PointMotion<T> {
-    let offset = state.frame.axes * Vec3::lift(leg.cylinder.center);
-    point_motion(&state.turn, offset, Vec3::zero(), Vec3::zero())
+pub fn cylinder<T: Real>(leg: &Leg<impl Constant<T>>, state: &State<T>) -> PointMotion<T> {
+    point_motion(state, leg.cylinder.center, Vec3::zero(), Vec3::zero())
 }
 
 /// How a rod turns about its own line, from the leg that leads it \[T7\].
@@ -278,12 +312,10 @@ pub struct RodTurn<T> {
 /// [Eq. 25, 36, 37] \[T7\] `ω_L = n·δ'/|L×δ|`, and its rate.
 #[inline(always)]
 pub fn rod_turn<T: Real>(axis: Vec3<T>, leader: &State<T>) -> RodTurn<T> {
-    let State { end, frame: f, turn, .. } = leader;
-    let inverse = T::one() / f.sine;
-    let rate = f.n().dot(end.delta_rate) * inverse;
-    // n' = ω_leg × n, and |L×δ|' = n·(L×δ')
-    let n1 = turn.omega.cross(f.n());
-    let sine1 = f.n().dot(axis.cross(end.delta_rate));
-    let acceleration = (n1.dot(end.delta_rate) + f.n().dot(end.delta_acceleration) - rate * sine1) * inverse;
+    let State { position: p, end, frame: f, turn } = leader;
+    let ([a, b], inverse) = (end.delta_rate, T::one() / f.sine);
+    let rate = a * inverse;
+    // n'·δ' = -s m·δ', and |L×δ|' = n·(L×δ') = (L·δ) m·δ'
+    let acceleration = (end.delta_acceleration[0] - b * (turn.spin + rate * axis.dot(p.delta))) * inverse;
     RodTurn { rate, acceleration }
 }

@@ -17,6 +17,7 @@ pub mod dynamics;
 pub mod forward;
 pub mod forward_dynamics;
 pub mod forward_lanes;
+pub mod geometry;
 pub mod inertial;
 pub mod jacobian;
 pub mod joints;
@@ -40,6 +41,8 @@ pub mod spatial;
 pub mod spec;
 pub mod status;
 mod svd;
+pub mod threads;
+pub mod trig;
 pub mod workspace;
 
 // The tests of the modules use the mechanisms of the other tests.

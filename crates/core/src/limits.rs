@@ -7,11 +7,12 @@ use std::sync::Arc;
 
 use crate::clearance::{Hull, Segment, distance};
 use crate::joints::{self, Zero};
-use crate::leg;
+use crate::lanes::{Lanes, Row, WIDTH};
+use crate::leg::{self, Position};
 use crate::mechanism::{Leg, Mechanism, Side};
-use crate::real::{Scalar, Trig};
+use crate::real::{Ordered, Real, Trig};
 use crate::singularity;
-use crate::spatial::{Pose, Vec3};
+use crate::spatial::{Mat3, Pose, Vec3};
 use crate::spec::{JointSpec, LegSpec, LimitsSpec, RodSpec, Spec};
 use crate::status::Status;
 
@@ -82,7 +83,7 @@ impl Bound {
             Bound::Most(most) => T::lit(most) - value,
             Bound::Between(min, max) => {
                 let off = joints::wrapped(value - T::lit(0.5 * (min + max)));
-                T::lit(0.5 * (max - min)) - T::select(off.value() < 0.0, -off, off)
+                T::lit(0.5 * (max - min)) - T::select(T::Value::zero().greater(off.value()), -off, off)
             }
         }
     }
@@ -146,54 +147,132 @@ impl Limit {
         }
     }
 
-    /// The measured quantity where the pose alone gives it: none for conditioning and force. No allocation.
+    /// The measured quantity of a limit of a joint; NaN for others.
     #[inline(always)]
-    pub fn geometric<T: Trig>(&self, mech: &Mechanism, pose: &Pose<T>) -> Option<T> {
-        Some(match &self.measure {
-            Measure::Length(leg) => leg::position(&mech.legs[*leg], pose).length,
-            Measure::Cone(leg, side) => cone(&mech.legs[*leg], *side, pose),
-            Measure::Angle(leg, side, zero) => angle(&mech.legs[*leg], *side, zero, pose),
-            Measure::RodAngle(rod, zero) => rod_angle(mech, *rod, zero, pose),
+    pub fn of_joint<T: Trig>(&self, mech: &Mechanism, pose: &Pose<T>, seen: &mut Seen<T>) -> T {
+        match &self.measure {
+            Measure::Length(leg) => seen.position(mech, pose, *leg).length,
+            Measure::Cone(leg, side) => cone(mech, *leg, *side, pose, seen),
+            Measure::Angle(leg, side, zero) => angle(mech, *leg, *side, zero, pose, seen),
+            Measure::RodAngle(rod, zero) => rod_angle(mech, *rod, zero, pose, seen),
+            _ => T::lit(f64::NAN),
+        }
+    }
+
+    /// The measured quantity where the pose alone gives it in closed form; NaN for conditioning and force.
+    #[inline(always)]
+    fn of_pose<T: Trig>(&self, mech: &Mechanism, pose: &Pose<T>, seen: &mut Seen<T>) -> T {
+        match &self.measure {
             Measure::Struts([a, b]) => {
                 distance(&a.in_base(mech, pose), &b.in_base(mech, pose)) - T::lit(a.radius + b.radius)
             }
             Measure::Plate(strut, hull) => {
                 hull.distance(&strut.in_platform(mech, pose)) - T::lit(strut.radius)
             }
-            Measure::Conditioning | Measure::Force { .. } => return None,
+            _ => self.of_joint(mech, pose, seen),
+        }
+    }
+
+    /// The same of one pose: none for conditioning and force. No allocation.
+    pub fn geometric<T: Trig>(&self, mech: &Mechanism, pose: &Pose<T>) -> Option<T> {
+        let closed = !matches!(self.measure, Measure::Conditioning | Measure::Force { .. });
+        closed.then(|| self.of_pose(mech, pose, &mut Seen::default()))
+    }
+
+    /// The signed slack at a pose, or at those of all lanes \[T35\]. `forces` are those of the actuators in the
+    /// Jacobian's order. Who asks for several limits at a pose has all share what is `seen` of its legs.
+    #[inline(always)]
+    pub fn margin_at<V: Lanes>(
+        &self,
+        mech: &Mechanism,
+        pose: &Pose<V>,
+        forces: &[V; 6],
+        seen: &mut Seen<V>,
+    ) -> V {
+        self.bound.margin(match self.measure {
+            Measure::Conditioning => smallest(mech, pose),
+            Measure::Force { row, .. } => forces[row],
+            _ => self.of_pose(mech, pose, seen),
         })
     }
 
-    /// The signed slack at a pose \[T35\]. `forces` are those of the actuators in the Jacobian's order; without them
-    /// the margin of a force is NaN.
+    /// The same of one pose; without forces the margin of a force is NaN.
     #[must_use]
     pub fn margin(&self, mech: &Mechanism, pose: &Pose<f64>, forces: Option<&[f64; 6]>) -> f64 {
-        self.bound.margin(match self.measure {
-            Measure::Conditioning => {
-                singularity::conditioning(mech, pose, mech.characteristic_length).sigma_min
-            }
-            Measure::Force { row, .. } => forces.map_or(f64::NAN, |f| f[row]),
-            _ => self.geometric(mech, pose).unwrap_or(f64::NAN),
-        })
+        self.margin_at(mech, pose, forces.unwrap_or(&[f64::NAN; 6]), &mut Seen::default())
     }
 }
 
+/// Where the leg is that was looked at last: limits that come one after the other are often those of one leg.
+#[derive(Clone, Copy, Debug)]
+pub struct Seen<T>(Option<(usize, Position<T>)>);
+
+impl<T> Default for Seen<T> {
+    #[inline(always)]
+    fn default() -> Self {
+        Seen(None)
+    }
+}
+
+impl<T: Real> Seen<T> {
+    #[inline(always)]
+    fn position(&mut self, mech: &Mechanism, pose: &Pose<T>, leg: usize) -> Position<T> {
+        match self.0 {
+            Some((last, position)) if last == leg => position,
+            _ => {
+                let position = leg::position(&mech.legs[leg], pose);
+                self.0 = Some((leg, position));
+                position
+            }
+        }
+    }
+}
+
+/// The smallest singular value in each lane, one after the other: the rotations it takes differ from pose to pose.
+#[inline(always)]
+fn smallest<V: Lanes>(mech: &Mechanism, pose: &Pose<V>) -> V {
+    let [x, y, z] = pose.rotation.0;
+    let mut rows = [[0.0; WIDTH]; 12];
+    for (k, part) in [x, y, z, pose.o].into_iter().enumerate() {
+        let [a, b, c] = part.array();
+        a.store(&mut rows[3 * k]);
+        b.store(&mut rows[3 * k + 1]);
+        c.store(&mut rows[3 * k + 2]);
+    }
+    V::load(&smallest_of_each(mech, &rows, V::WIDTH))
+}
+
+/// The same from the columns of R and o, of the first `count` lanes.
+#[inline(never)]
+fn smallest_of_each(mech: &Mechanism, rows: &[Row; 12], count: usize) -> Row {
+    let mut found = [0.0; WIDTH];
+    for (lane, sigma) in found.iter_mut().enumerate().take(count) {
+        let part = |k: usize| Vec3::new(rows[3 * k][lane], rows[3 * k + 1][lane], rows[3 * k + 2][lane]);
+        let pose = Pose { rotation: Mat3([part(0), part(1), part(2)]), o: part(3) };
+        *sigma = singularity::conditioning(mech, &pose, mech.characteristic_length).sigma_min;
+    }
+    found
+}
+
 impl Strut {
-    fn in_base<T: Scalar>(&self, mech: &Mechanism, pose: &Pose<T>) -> Segment<T> {
+    #[inline(always)]
+    fn in_base<T: Real>(&self, mech: &Mechanism, pose: &Pose<T>) -> Segment<T> {
         let leg = &mech.legs[self.leg];
-        let b = pose.o + pose.rotation * Vec3::lift(leg.platform.point);
+        let b = pose.o + pose.rotation.of(leg.platform.point);
         Segment(Vec3::lift(leg.base.point), b).without(self.cut)
     }
 
-    fn in_platform<T: Scalar>(&self, mech: &Mechanism, pose: &Pose<T>) -> Segment<T> {
+    #[inline(always)]
+    fn in_platform<T: Real>(&self, mech: &Mechanism, pose: &Pose<T>) -> Segment<T> {
         let leg = &mech.legs[self.leg];
         let foot = pose.rotation.transpose_mul(Vec3::lift(leg.base.point) - pose.o);
         Segment(foot, Vec3::lift(leg.platform.point)).without(self.cut)
     }
 }
 
-fn cone<T: Trig>(leg: &Leg, side: Side, pose: &Pose<T>) -> T {
-    let delta = leg::position(leg, pose).delta;
+#[inline(always)]
+fn cone<T: Trig>(mech: &Mechanism, leg: usize, side: Side, pose: &Pose<T>, seen: &mut Seen<T>) -> T {
+    let (delta, leg) = (seen.position(mech, pose, leg).delta, &mech.legs[leg]);
     match side {
         Side::Base => joints::cone_angle(&leg.base, delta),
         Side::Platform => joints::cone_angle(&leg.platform, pose.rotation.transpose_mul(delta)),
@@ -201,16 +280,26 @@ fn cone<T: Trig>(leg: &Leg, side: Side, pose: &Pose<T>) -> T {
 }
 
 /// Turn of an R joint; of one on a rod, about n.
-fn angle<T: Trig>(leg: &Leg, side: Side, zero: &Zero, pose: &Pose<T>) -> T {
-    let p = leg::position(leg, pose);
+#[inline(always)]
+fn angle<T: Trig>(
+    mech: &Mechanism,
+    leg: usize,
+    side: Side,
+    zero: &Zero,
+    pose: &Pose<T>,
+    seen: &mut Seen<T>,
+) -> T {
+    let (p, leg) = (seen.position(mech, pose, leg), &mech.legs[leg]);
     let n = leg::frame(leg, pose, &p).n();
     let on_rod = side == Side::Base && leg.rod.is_some();
     joints::angles_at(leg, side, zero, &pose.rotation, n, p.delta)[usize::from(on_rod)]
 }
 
-fn rod_angle<T: Trig>(mech: &Mechanism, rod: usize, zero: &Zero, pose: &Pose<T>) -> T {
-    let leader = &mech.legs[mech.rods[rod].leader];
-    joints::rod_angle(mech, rod, zero, leg::frame(leader, pose, &leg::position(leader, pose)).n())
+#[inline(always)]
+fn rod_angle<T: Trig>(mech: &Mechanism, rod: usize, zero: &Zero, pose: &Pose<T>, seen: &mut Seen<T>) -> T {
+    let leader = mech.rods[rod].leader;
+    let p = seen.position(mech, pose, leader);
+    joints::rod_angle(mech, rod, zero, leg::frame(&mech.legs[leader], pose, &p).n())
 }
 
 /// The signed slack of every limit in the mechanism's order, each in its own unit \[T35\].
@@ -222,19 +311,52 @@ fn rod_angle<T: Trig>(mech: &Mechanism, rod: usize, zero: &Zero, pose: &Pose<T>)
 /// If `out` has not one place for each limit.
 pub fn margins(mech: &Mechanism, pose: &Pose<f64>, forces: Option<&[f64; 6]>, out: &mut [f64]) {
     assert_eq!(out.len(), mech.limits.len(), "one margin for each limit");
+    let (forces, mut seen) = (forces.unwrap_or(&[f64::NAN; 6]), Seen::default());
     for (margin, limit) in out.iter_mut().zip(&mech.limits) {
-        *margin = limit.margin(mech, pose, forces);
+        *margin = limit.margin_at(mech, pose, forces, &mut seen);
+    }
+}
+
+/// Which limit has the least margin relative to its scale, and that margin \[T35\].
+#[derive(Clone, Copy, Debug)]
+pub struct Binding<V> {
+    /// Its number, the first of several; NaN where a margin is NaN, or without limits.
+    pub limit: V,
+    relative: V,
+    /// Zero, or NaN once there was one.
+    known: V,
+}
+
+impl<V: Ordered> Default for Binding<V> {
+    #[inline(always)]
+    fn default() -> Self {
+        Binding { limit: V::lit(f64::NAN), relative: V::lit(f64::INFINITY), known: V::zero() }
+    }
+}
+
+impl<V: Ordered> Binding<V> {
+    /// Looks at the next limit.
+    #[must_use]
+    #[inline(always)]
+    pub fn or(self, number: usize, relative: V) -> Self {
+        let known = V::select(relative.at_most(relative), self.known, V::lit(f64::NAN));
+        let less = self.relative.greater(relative);
+        Binding {
+            limit: V::select(less, V::lit(number as f64), self.limit) + known,
+            relative: self.relative.least(relative),
+            known,
+        }
     }
 }
 
 /// The limit with the least margin relative to its scale; none where a margin is NaN, or without limits \[T35\].
 #[must_use]
 pub fn binding(mech: &Mechanism, margins: &[f64]) -> Option<usize> {
-    if margins.iter().any(|m| m.is_nan()) {
-        return None;
+    let mut binding = Binding::default();
+    for (k, (margin, limit)) in margins.iter().zip(&mech.limits).enumerate() {
+        binding = binding.or(k, margin / limit.scale);
     }
-    let relative = |i: &usize| margins[*i] / mech.limits[*i].scale;
-    (0..margins.len()).min_by(|a, b| relative(a).total_cmp(&relative(b)))
+    (!binding.limit.is_nan()).then_some(binding.limit as usize)
 }
 
 /// What kinematics calls a pose: the first limit of a joint that it breaks, strokes before cones before angles. The

@@ -20,20 +20,30 @@ pub fn solve<T: Real, const N: usize>(m: [[T; N]; N], rhs: [T; N]) -> Solved<T, 
     Solved { x, pivots, sign }
 }
 
-/// Solves `m x = rhs` for several right-hand sides by Gaussian elimination with partial pivoting, rows exchanged by
-/// [`Real::select`].
+/// Solves `m x = rhs` for several right-hand sides.
 #[inline(always)]
 pub fn solve_all<T: Real, const N: usize, const M: usize>(
+    m: [[T; N]; N],
+    rhs: [[T; N]; M],
+) -> Solved<T, [[T; N]; M]> {
+    solve_first(m, rhs, N)
+}
+
+/// Solves the first `size` equations in as many unknowns for several right-hand sides by Gaussian elimination with
+/// partial pivoting, rows exchanged by [`Real::select`]; the rest is not read.
+#[inline(always)]
+pub fn solve_first<T: Real, const N: usize, const M: usize>(
     mut m: [[T; N]; N],
     mut rhs: [[T; N]; M],
+    size: usize,
 ) -> Solved<T, [[T; N]; M]> {
     let mut sign = T::Value::one();
     let mut inverses = [T::zero(); N];
-    for k in 0..N {
+    for k in 0..size {
         // Bubble the largest entry of column k up to the diagonal.
-        for i in k + 1..N {
+        for i in k + 1..size {
             let larger = m[i][k].value().abs().greater(m[k][k].value().abs());
-            for j in k..N {
+            for j in k..size {
                 let (a, b) = (m[k][j], m[i][j]);
                 m[k][j] = T::select(larger, b, a);
                 m[i][j] = T::select(larger, a, b);
@@ -46,9 +56,9 @@ pub fn solve_all<T: Real, const N: usize, const M: usize>(
             }
         }
         inverses[k] = T::one() / m[k][k];
-        for i in k + 1..N {
+        for i in k + 1..size {
             let factor = -(m[i][k] * inverses[k]);
-            for j in k + 1..N {
+            for j in k + 1..size {
                 m[i][j] = factor.mul_add(m[k][j], m[i][j]);
             }
             for x in &mut rhs {
@@ -57,10 +67,10 @@ pub fn solve_all<T: Real, const N: usize, const M: usize>(
         }
     }
     let (mut least, mut most) = (T::Value::lit(f64::INFINITY), T::Value::zero());
-    for k in (0..N).rev() {
+    for k in (0..size).rev() {
         for x in &mut rhs {
             let mut sum = x[k];
-            for j in k + 1..N {
+            for j in k + 1..size {
                 sum = (-m[k][j]).mul_add(x[j], sum);
             }
             x[k] = sum * inverses[k];

@@ -27,46 +27,55 @@ pub enum Side {
 
 /// What gives the leg's frame (n, δ, n×δ) its direction n, and so its spin about δ \[T5\].
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Turning {
+pub enum Turning<S = f64> {
     /// A universal joint: n is along u×δ.
-    Across(Side, Vec3<f64>),
+    Across(Side, Vec3<S>),
     /// A revolute or fixed joint: n is the axis u itself.
-    Along(Side, Vec3<f64>),
+    Along(Side, Vec3<S>),
     /// S at both ends: no spin; u only gives the frame a direction.
-    Free(Vec3<f64>),
+    Free(Vec3<S>),
+}
+
+impl<S> Turning<S> {
+    /// u, in the axes of its body.
+    pub fn axis(self) -> Vec3<S> {
+        match self {
+            Turning::Across(_, u) | Turning::Along(_, u) | Turning::Free(u) => u,
+        }
+    }
 }
 
 #[derive(Clone, Debug)]
-pub struct Joint {
+pub struct Joint<S = f64> {
     pub kind: JointKind,
     /// In the axes of its body, m.
-    pub point: Vec3<f64>,
+    pub point: Vec3<S>,
     /// Unit axis in the axes of its body: U, the axis fixed to that body; R, its axis; F, the leg's direction.
-    pub axis: Option<Vec3<f64>>,
+    pub axis: Option<Vec3<S>>,
     /// F: the leg's n.
-    pub normal: Option<Vec3<f64>>,
+    pub normal: Option<Vec3<S>>,
     /// Unit axis from which the cone angle is measured, in the axes of the body.
     pub cone_axis: Vec3<f64>,
 }
 
 #[derive(Clone, Debug)]
-pub struct Leg {
+pub struct Leg<S = f64> {
     pub name: String,
     pub actuated: bool,
     /// Of the strut, m.
     pub radius: Option<f64>,
-    pub base: Joint,
-    pub platform: Joint,
+    pub base: Joint<S>,
+    pub platform: Joint<S>,
     /// The rod that carries the base joint. Seen from the leg the joint is then U with the rod's line as its axis.
     pub rod: Option<usize>,
     /// Centre measured from B, in leg axes.
     pub cylinder: Body,
     /// Centre measured from b, in leg axes.
     pub piston: Body,
-    pub turning: Turning,
+    pub turning: Turning<S>,
 }
 
-impl Leg {
+impl<S> Leg<S> {
     /// Letters of its joints from base to platform, `RPU` for one on a rod.
     #[must_use]
     pub fn letters(&self) -> String {
@@ -76,11 +85,11 @@ impl Leg {
 }
 
 #[derive(Clone, Debug)]
-pub struct Rod {
+pub struct Rod<S = f64> {
     pub name: String,
-    pub point: Vec3<f64>,
+    pub point: Vec3<S>,
     /// Unit vector L.
-    pub axis: Vec3<f64>,
+    pub axis: Vec3<S>,
     pub body: Body,
     /// The leg that the rod's turning is computed from, the first that it carries.
     pub leader: usize,
@@ -107,26 +116,26 @@ pub enum ConstraintKind {
 }
 
 #[derive(Clone, Copy, Debug)]
-pub struct Constraint {
+pub struct Constraint<S = f64> {
     pub kind: ConstraintKind,
     pub leg: usize,
     /// B in base axes and m in platform axes.
-    pub base_point: Vec3<f64>,
-    pub platform_point: Vec3<f64>,
+    pub base_point: Vec3<S>,
+    pub platform_point: Vec3<S>,
     /// Unit axes: L or a_B in base axes, l or a_P in platform axes; zero where the kind has none.
-    pub base_axis: Vec3<f64>,
-    pub platform_axis: Vec3<f64>,
+    pub base_axis: Vec3<S>,
+    pub platform_axis: Vec3<S>,
     /// Kind E only; of no effect elsewhere.
-    pub partner: Partner,
+    pub partner: Partner<S>,
 }
 
 /// The first leg on the rod of a constraint of kind E.
 #[derive(Clone, Copy, Debug)]
-pub struct Partner {
-    pub base_point: Vec3<f64>,
-    pub platform_point: Vec3<f64>,
+pub struct Partner<S = f64> {
+    pub base_point: Vec3<S>,
+    pub platform_point: Vec3<S>,
     /// Q, the constant turn about L that takes the plane of the first leg into that of the second.
-    pub turn: Mat3<f64>,
+    pub turn: Mat3<S>,
 }
 
 /// A link of the topology graph with the numbers of its joints.
@@ -184,10 +193,10 @@ pub struct ConstraintRow {
 }
 
 #[derive(Clone, Debug)]
-pub struct Mechanism {
+pub struct Mechanism<S = f64> {
     pub name: String,
-    pub legs: Vec<Leg>,
-    pub rods: Vec<Rod>,
+    pub legs: Vec<Leg<S>>,
+    pub rods: Vec<Rod<S>>,
     pub platform: Body,
     pub gravity: Vec3<f64>,
     pub efficiency: f64,
@@ -198,9 +207,9 @@ pub struct Mechanism {
     pub tool_point: Vec3<f64>,
     pub tool_axis: Vec3<f64>,
     /// Every scalar constraint of every leg.
-    pub constraints: Vec<Constraint>,
+    pub constraints: Vec<Constraint<S>>,
     /// Those of them that are independent at generic poses, in the order of the legs.
-    pub independent: Vec<Constraint>,
+    pub independent: Vec<Constraint<S>>,
     /// Root mean square distance of the platform joints from o: what lengths are scaled by, m.
     pub characteristic_length: f64,
     pub mobility: Mobility,
@@ -211,14 +220,14 @@ pub struct Mechanism {
 /// The largest number of independent constraints: one freedom at least must remain.
 pub const MAX_CONSTRAINTS: usize = 5;
 
-impl Mechanism {
+impl<S> Mechanism<S> {
     #[must_use]
     pub fn dof(&self) -> usize {
         6 - self.independent.len()
     }
 
     /// Legs with an actuator, in the order of the Jacobian's rows.
-    pub fn actuated(&self) -> impl Iterator<Item = (usize, &Leg)> {
+    pub fn actuated(&self) -> impl Iterator<Item = (usize, &Leg<S>)> {
         self.legs.iter().enumerate().filter(|(_, leg)| leg.actuated)
     }
 }

@@ -22,7 +22,12 @@ pub fn quadratic<T: Real>(h: &Hessian<T>, v: &[T; 6]) -> T {
 #[inline(always)]
 pub fn point_columns<T: Real>(e: Vec3<T>) -> [Vec3<T>; 6] {
     let axes = Mat3::<T>::identity().0;
-    std::array::from_fn(|i| if i < 3 { axes[i] } else { axes[i - 3].cross(e) })
+    let mut columns = [Vec3::zero(); 6];
+    for i in 0..3 {
+        columns[i] = axes[i];
+        columns[3 + i] = axes[i].cross(e);
+    }
+    columns
 }
 
 /// Adds the form `[ω×(ω×x)]·y = (ω·x)(ω·y) - (x·y) ω·ω`.
@@ -38,12 +43,10 @@ pub fn add_centripetal<T: Real>(h: &mut Hessian<T>, x: Vec3<T>, y: Vec3<T>) {
     }
 }
 
-/// Adds the form `2 v_b·q(ω)` with `v_b = v + ω×e` and q linear.
+/// Adds the form `2 v_b·q(ω)` with `v_b = v + ω×e` and q linear, given for the three axes.
 #[inline(always)]
-pub fn add_mixed<T: Real>(h: &mut Hessian<T>, e: Vec3<T>, q: impl Fn(Vec3<T>) -> Vec3<T>) {
-    let axes = Mat3::<T>::identity().0;
-    for (j, axis) in axes.into_iter().enumerate() {
-        let q = q(axis);
+pub fn add_mixed<T: Real>(h: &mut Hessian<T>, e: Vec3<T>, q: [Vec3<T>; 3]) {
+    for (j, q) in q.into_iter().enumerate() {
         let (linear, angular) = (q.array(), e.cross(q).array());
         for i in 0..3 {
             h[i][3 + j] = h[i][3 + j] + linear[i];

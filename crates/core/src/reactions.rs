@@ -6,9 +6,9 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::dynamics::{inertial_force, inertial_torque, platform_wrench, rod_wrench};
+use crate::dynamics::{inertial_force, platform_wrench, rod_wrench, turning_torque};
 use crate::leg;
-use crate::mechanism::{ConstraintKind, Leg, Mechanism};
+use crate::mechanism::{Body, ConstraintKind, Leg, Mechanism};
 use crate::real::Real;
 use crate::spatial::{Mat3, Motion, Pose, Vec3, Wrench};
 use crate::spec::JointKind;
@@ -159,9 +159,9 @@ impl<T: Real> Given<T> {
     pub fn of(mech: &Mechanism, platform: &Motion<T>, load: Wrench<T>) -> Self {
         let gravity = Vec3::lift(mech.gravity);
         let states: Vec<_> = mech.legs.iter().map(|leg| leg::state(leg, platform)).collect();
-        let link = |body, center: &leg::PointMotion<T>, state: &leg::State<T>| {
+        let link = |body: &Body, center: &leg::PointMotion<T>, state: &leg::State<T>| {
             let turn = &state.turn;
-            let torque = inertial_torque(body, state.frame.axes, turn.omega, turn.eps);
+            let torque = state.frame.axes * turning_torque(body.inertia, turn.omega, turn.eps);
             let force = inertial_force(body, gravity, center.acceleration);
             Wrench::new(force, center.offset.cross(force) + torque)
         };

@@ -3,11 +3,14 @@
 //! [`Real`] is what a kernel may use: field operations, a square root, and [`Real::select`] in place of a branch.
 //! `f64` and [`F`] are numbers; [`Dual`] carries one derivative along, [`Jet`] a rate and a second rate, so that the
 //! same source gives values, exact derivatives and exact time histories.
-//! [`Trig`] adds what only coordinate sets need, [`Scalar`] names the numbers of a single state, which may be branched on.
+//! [`Trig`] adds what only coordinate sets and joint angles need, [`Scalar`] names the numbers of a single state, which may
+//! be branched on.
 //! Complex numbers and lanes of numbers are in [`complex`](crate::complex) and [`lanes`](crate::lanes).
 
 use std::fmt::Debug;
 use std::ops::{Add, Div, Mul, Neg, Sub};
+
+use crate::trig;
 
 /// A number for the kernels: no trigonometry, no branching on values.
 pub trait Real:
@@ -63,11 +66,13 @@ pub trait Real:
 }
 
 /// Numbers in an order: one, or one in each lane.
-pub trait Ordered: Real<Value = Self> {
+pub trait Ordered: Real<Value = Self> + Trig {
     /// Yes or no, for each lane.
     type Mask: Copy;
 
     fn greater(self, than: Self) -> Self::Mask;
+    /// No where they cannot be compared.
+    fn at_most(self, other: Self) -> Self::Mask;
     #[must_use]
     fn abs(self) -> Self;
     /// 1 or -1.
@@ -96,14 +101,61 @@ pub type Mask<T> = <<T as Real>::Value as Ordered>::Mask;
 pub trait Scalar: Real<Value = f64> {}
 impl<T: Real<Value = f64>> Scalar for T {}
 
-/// Trigonometry, for the coordinate sets only.
-pub trait Trig: Scalar {
+/// Trigonometry, for coordinate sets and angles of joints; of plain numbers by [`trig`].
+pub trait Trig: Real {
     fn sin_cos(self) -> (Self, Self);
     #[must_use]
     fn acos(self) -> Self;
     /// The angle of the point `(x, self)`.
     #[must_use]
     fn atan2(self, x: Self) -> Self;
+}
+
+/// A number of the mechanism, a constant to the kernels' number `T`: a double, or one that carries its derivative by a
+/// number of the geometry, for kernels whose numbers carry that as well \[T56\].
+pub trait Constant<T: Real>: Scalar {
+    fn lift(self) -> T;
+
+    /// `x` times the constant.
+    #[must_use]
+    #[inline(always)]
+    fn times(self, x: T) -> T {
+        x * self.lift()
+    }
+}
+
+impl<T: Real> Constant<T> for f64 {
+    #[inline(always)]
+    fn lift(self) -> T {
+        T::lit(self)
+    }
+    #[inline(always)]
+    fn times(self, x: T) -> T {
+        x.scale(self)
+    }
+}
+
+impl Constant<Self> for Dual<f64> {
+    #[inline(always)]
+    fn lift(self) -> Self {
+        self
+    }
+}
+
+/// The same in any direction that the outer number differentiates by.
+impl Constant<Dual<Self>> for Dual<f64> {
+    #[inline(always)]
+    fn lift(self) -> Dual<Self> {
+        Dual::new(self, Self::zero())
+    }
+}
+
+/// At rest along a motion.
+impl Constant<Jet<Self>> for Dual<f64> {
+    #[inline(always)]
+    fn lift(self) -> Jet<Self> {
+        Jet::new(self, Self::zero(), Self::zero())
+    }
 }
 
 impl Real for f64 {
@@ -133,6 +185,10 @@ impl Ordered for f64 {
         self > than
     }
     #[inline(always)]
+    fn at_most(self, other: Self) -> bool {
+        self <= other
+    }
+    #[inline(always)]
     fn abs(self) -> Self {
         f64::abs(self)
     }
@@ -145,15 +201,15 @@ impl Ordered for f64 {
 impl Trig for f64 {
     #[inline(always)]
     fn sin_cos(self) -> (Self, Self) {
-        f64::sin_cos(self)
+        trig::sin_cos(self)
     }
     #[inline(always)]
     fn acos(self) -> Self {
-        f64::acos(self)
+        trig::acos(self)
     }
     #[inline(always)]
     fn atan2(self, x: Self) -> Self {
-        f64::atan2(self, x)
+        trig::atan2(self, x)
     }
 }
 
@@ -378,6 +434,10 @@ impl<T: Real> Real for Jet<T> {
     #[inline(always)]
     fn lit(x: f64) -> Self {
         Jet::new(T::lit(x), T::zero(), T::zero())
+    }
+    #[inline(always)]
+    fn scale(self, x: f64) -> Self {
+        Jet::new(self.x.scale(x), self.d.scale(x), self.dd.scale(x))
     }
     #[inline(always)]
     fn value(self) -> T::Value {

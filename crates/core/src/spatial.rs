@@ -7,7 +7,7 @@ use std::ops::{Add, Mul, Neg, Sub};
 
 use serde::{Deserialize, Serialize};
 
-use crate::real::{Dual, Real};
+use crate::real::{Constant, Dual, Jet, Real, Scalar, Trig};
 
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(from = "[T; 3]", into = "[T; 3]")]
@@ -44,8 +44,8 @@ impl<T: Real> Vec3<T> {
 
     /// A constant of the mechanism as a vector of the kernel's number.
     #[inline(always)]
-    pub fn lift(a: Vec3<f64>) -> Self {
-        Vec3::new(T::lit(a.x), T::lit(a.y), T::lit(a.z))
+    pub fn lift(a: Vec3<impl Constant<T>>) -> Self {
+        Vec3 { x: a.x.lift(), y: a.y.lift(), z: a.z.lift() }
     }
 
     #[inline(always)]
@@ -77,8 +77,8 @@ impl<T: Real> Vec3<T> {
     /// The vector times a constant.
     #[must_use]
     #[inline(always)]
-    pub fn scale(self, k: f64) -> Self {
-        Vec3::new(self.x.scale(k), self.y.scale(k), self.z.scale(k))
+    pub fn scale(self, k: impl Constant<T>) -> Self {
+        Vec3::new(k.times(self.x), k.times(self.y), k.times(self.z))
     }
 
     #[inline(always)]
@@ -89,6 +89,14 @@ impl<T: Real> Vec3<T> {
     #[inline(always)]
     pub fn array(self) -> [T; 3] {
         self.into()
+    }
+
+    /// The vector with its rate and second rate.
+    #[must_use]
+    #[inline(always)]
+    pub fn with_rates(self, d: Self, dd: Self) -> Vec3<Jet<T>> {
+        let (x, y) = (Jet::new(self.x, d.x, dd.x), Jet::new(self.y, d.y, dd.y));
+        Vec3 { x, y, z: Jet::new(self.z, d.z, dd.z) }
     }
 }
 
@@ -102,11 +110,13 @@ impl Vec3<f64> {
     pub const X: Self = Vec3 { x: 1.0, y: 0.0, z: 0.0 };
     pub const Y: Self = Vec3 { x: 0.0, y: 1.0, z: 0.0 };
     pub const Z: Self = Vec3 { x: 0.0, y: 0.0, z: 1.0 };
+}
 
+impl<T: Scalar> Vec3<T> {
     /// A unit vector square to this one, on the side of the base axis that this one leans on least.
     #[must_use]
     pub fn perpendicular(self) -> Self {
-        let [x, y, z] = self.map(f64::abs).array();
+        let [x, y, z] = self.map(|c| c.value().abs()).array();
         let axis = if z <= x && z <= y {
             Vec3::Z
         } else if y <= x {
@@ -114,7 +124,7 @@ impl Vec3<f64> {
         } else {
             Vec3::X
         };
-        self.cross(axis).cross(self).unit()
+        self.cross(Vec3::lift(axis)).cross(self).unit()
     }
 }
 
@@ -162,7 +172,8 @@ impl<T: Real> Mat3<T> {
 
     #[inline(always)]
     pub fn from_rows(m: [[T; 3]; 3]) -> Self {
-        Mat3([0, 1, 2].map(|j| Vec3::new(m[0][j], m[1][j], m[2][j])))
+        let [x, y, z] = m;
+        Mat3([Vec3::new(x[0], y[0], z[0]), Vec3::new(x[1], y[1], z[1]), Vec3::new(x[2], y[2], z[2])])
     }
 
     pub fn rows(self) -> [[T; 3]; 3] {
@@ -176,7 +187,7 @@ impl<T: Real> Mat3<T> {
     }
 
     #[inline(always)]
-    pub fn lift(m: Mat3<f64>) -> Self {
+    pub fn lift(m: Mat3<impl Constant<T>>) -> Self {
         let [x, y, z] = m.0;
         Mat3([Vec3::lift(x), Vec3::lift(y), Vec3::lift(z)])
     }
@@ -222,11 +233,12 @@ impl<T: Real> Mat3<T> {
         let w = a.cross(b);
         let k = T::one() / (T::one() + a.dot(b));
         // 1 + [w] + [w]² / (1 + a·b)
-        let column = |e: Vec3<T>| {
-            let we = w.cross(e);
-            e + we + w.cross(we) * k
-        };
-        Mat3(Mat3::identity().0.map(column))
+        let mut columns = Mat3::identity().0;
+        for e in &mut columns {
+            let we = w.cross(*e);
+            *e = *e + we + w.cross(we) * k;
+        }
+        Mat3(columns)
     }
 }
 
@@ -234,7 +246,7 @@ impl<T: Real> Mat3<T> {
     /// `M a` for a constant vector.
     #[must_use]
     #[inline(always)]
-    pub fn of(self, a: Vec3<f64>) -> Vec3<T> {
+    pub fn of(self, a: Vec3<impl Constant<T>>) -> Vec3<T> {
         let [x, y, z] = self.0;
         x.scale(a.x) + y.scale(a.y) + z.scale(a.z)
     }
@@ -260,29 +272,34 @@ impl<T: Real> Mat3<T> {
         let half = T::lit(0.5);
         let products = self.transpose() * self;
         let identity = Mat3::identity();
-        let excess = Mat3([0, 1, 2].map(|j| (products.0[j] - identity.0[j]) * half));
-        let correction = self * excess;
-        Mat3([0, 1, 2].map(|j| self.0[j] - correction.0[j]))
+        let mut columns = self.0;
+        for j in 0..3 {
+            let excess = (products.0[j] - identity.0[j]) * half;
+            columns[j] = columns[j] - self * excess;
+        }
+        Mat3(columns)
     }
 }
 
-impl Mat3<f64> {
+impl<T: Trig + Scalar> Mat3<T> {
     /// Rodrigues' formula for the turn by |w| about w.
     #[must_use]
-    pub fn from_rotation_vector(w: Vec3<f64>) -> Self {
+    pub fn from_rotation_vector(w: Vec3<T>) -> Self {
         let angle = w.norm();
-        if angle == 0.0 {
-            return Mat3::identity();
+        if angle.value() == 0.0 {
+            return Mat3(Mat3::identity().0.map(|e: Vec3<T>| e + w.cross(e)));
         }
-        let axis = w * (1.0 / angle);
+        let axis = w * (T::one() / angle);
         let (s, c) = angle.sin_cos();
         Mat3(
             Mat3::identity()
                 .0
-                .map(|e: Vec3<f64>| e * c + axis.cross(e) * s + axis * (axis.dot(e) * (1.0 - c))),
+                .map(|e: Vec3<T>| e * c + axis.cross(e) * s + axis * (axis.dot(e) * (T::one() - c))),
         )
     }
+}
 
+impl Mat3<f64> {
     /// The inverse of [`Mat3::from_rotation_vector`] for turns below a half turn.
     #[must_use]
     pub fn rotation_vector(self) -> Vec3<f64> {
@@ -291,17 +308,20 @@ impl Mat3<f64> {
         let (s, c) = (w.norm(), (a.x + b.y + c.z - 1.0) * 0.5);
         if s == 0.0 { w } else { w * (s.atan2(c) / s) }
     }
+}
 
-    /// How far from a rotation: the largest entry of `MᵀM - 1`, or infinity for a mirror image.
-    #[must_use]
-    pub fn rotation_error(self) -> f64 {
+impl<T: Real> Mat3<T> {
+    /// The entries of `MᵀM - 1`, all zero for a rotation or a mirror image.
+    #[inline(always)]
+    pub fn departures(self) -> [T; 6] {
+        let ([a, b, c], one) = (self.0, T::one());
+        [a.dot(a) - one, b.dot(b) - one, c.dot(c) - one, a.dot(b), b.dot(c), c.dot(a)]
+    }
+
+    #[inline(always)]
+    pub fn determinant(self) -> T {
         let [a, b, c] = self.0;
-        let products =
-            [a.dot(a) - 1.0, b.dot(b) - 1.0, c.dot(c) - 1.0, a.dot(b), b.dot(c), c.dot(a)].map(f64::abs);
-        if a.cross(b).dot(c) <= 0.0 {
-            return f64::INFINITY;
-        }
-        products.into_iter().fold(0.0, |m, e| if e > m || e.is_nan() { e } else { m })
+        a.cross(b).dot(c)
     }
 }
 
@@ -309,7 +329,21 @@ impl<T: Real> Mul<Vec3<T>> for Mat3<T> {
     type Output = Vec3<T>;
     #[inline(always)]
     fn mul(self, a: Vec3<T>) -> Vec3<T> {
-        self.0[0] * a.x + self.0[1] * a.y + self.0[2] * a.z
+        let [x, y, z] = self.0;
+        Vec3::new(
+            x.x.mul_add(a.x, y.x.mul_add(a.y, z.x * a.z)),
+            x.y.mul_add(a.x, y.y.mul_add(a.y, z.y * a.z)),
+            x.z.mul_add(a.x, y.z.mul_add(a.y, z.z * a.z)),
+        )
+    }
+}
+
+impl<T: Real> Add for Mat3<T> {
+    type Output = Self;
+    #[inline(always)]
+    fn add(self, b: Self) -> Self {
+        let ([a, b, c], [x, y, z]) = (self.0, b.0);
+        Mat3([a + x, b + y, c + z])
     }
 }
 
@@ -391,6 +425,26 @@ pub struct Motion<T> {
     pub pose: Pose<T>,
     pub twist: Twist<T>,
     pub acceleration: Acceleration<T>,
+}
+
+impl<T: Real> Motion<T> {
+    /// The pose with its rate and second rate.
+    #[must_use]
+    #[inline(always)]
+    pub fn jets(&self) -> Pose<Jet<T>> {
+        let Motion { pose, twist, acceleration } = self;
+        let (omega, eps) = (twist.omega, acceleration.eps);
+        let [x, y, z] = pose.rotation.0;
+        // [T2] with the columns of R for e: x' = ω × x, x'' = ε × x + ω × (ω × x)
+        let [x1, y1, z1] = [omega.cross(x), omega.cross(y), omega.cross(z)];
+        let x2 = eps.cross(x) + omega.cross(x1);
+        let y2 = eps.cross(y) + omega.cross(y1);
+        let z2 = eps.cross(z) + omega.cross(z1);
+        Pose {
+            rotation: Mat3([x.with_rates(x1, x2), y.with_rates(y1, y2), z.with_rates(z1, z2)]),
+            o: pose.o.with_rates(twist.v, acceleration.a),
+        }
+    }
 }
 
 macro_rules! six_vector {

@@ -46,6 +46,13 @@ impl Status {
         Status::OutOfAngle,
     ];
 
+    /// Whether there are numbers all the same: the pose is one, but beyond what the machine can reach.
+    #[must_use]
+    #[inline(always)]
+    pub fn stands(self) -> bool {
+        matches!(self, Status::Ok | Status::OutOfStroke | Status::OutOfCone | Status::OutOfAngle)
+    }
+
     /// What it means and what helps.
     #[must_use]
     pub fn message(self) -> &'static str {

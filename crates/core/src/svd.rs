@@ -61,10 +61,11 @@ fn sweep(u: &mut DMatrix<f64>, v: &mut DMatrix<f64>, nothing: f64) -> bool {
             if a.min(b) <= nothing || product.abs() <= SQUARE * (a * b).sqrt() {
                 continue;
             }
-            // The lesser turn that makes them square: t = tan of its angle, t² + 2 ζ t = 1.
+            // The lesser turn that makes them square: t = tan of its angle, t² + 2 ζ t = 1. What was passed over above
+            // keeps ζ below 1e31, so that its square is finite.
             let zeta = (b - a) / (2.0 * product);
-            let t = zeta.signum() / (zeta.abs() + zeta.hypot(1.0));
-            let cos = 1.0 / t.hypot(1.0);
+            let t = zeta.signum() / (zeta.abs() + (zeta * zeta + 1.0).sqrt());
+            let cos = 1.0 / (t * t + 1.0).sqrt();
             rotate(u, i, j, cos, cos * t);
             rotate(v, i, j, cos, cos * t);
             turned = true;

@@ -210,11 +210,11 @@ impl Flood {
         }
         let margins = margins(mech, &pose);
         let binding = margins.iter().position(|&margin| margin <= AT_LIMIT);
-        let beyond = || fit(mech, &pose, inner + way * high);
+        let ends_here = || moved(mech, &pose, inner + way * high, self.sign).is_none();
         let stop = match (binding, self.sign) {
             _ if ends && low >= whole - EXACT / self.grid.step => Stop::Grid,
             (Some(limit), _) => Stop::Limit(limit),
-            (_, Some(kept)) if beyond().is_none_or(|p| sign(mech, &p) != kept) => Stop::Singularity,
+            (_, Some(_)) if ends_here() => Stop::Singularity,
             _ => Stop::Search,
         };
         Edge { node, direction, share: low, pose, stop, margin: nearest(mech, &margins) }

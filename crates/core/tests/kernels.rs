@@ -73,13 +73,16 @@ fn leg_motion_is_the_derivative_of_leg_position() {
             for leg in &mech.legs {
                 let jet = leg::position(leg, &moving(&state));
                 let p = leg::position(leg, &state.pose);
-                let m = leg::end(&p, &state);
+                let f = leg::frame(leg, &state.pose, &p);
+                let m = leg::end(&p, &f, &state);
                 let [_, r1, r2] = parts(jet.r);
                 let [_, d1, d2] = parts(jet.delta);
                 close(m.v_b, r1, EXACT, "v_b");
                 close(m.a_b, r2, EXACT, "a_b");
-                close(m.delta_rate, d1, EXACT, "δ'");
-                close(m.delta_acceleration, d2, EXACT, "δ''");
+                let ([a, b], speed) = (m.delta_rate, m.delta_rate[0].hypot(m.delta_rate[1]));
+                close(f.axes * Vec3::new(a, 0.0, b), d1, EXACT, "δ'");
+                let [a, b] = m.delta_acceleration;
+                close(f.axes * Vec3::new(a, -speed * speed, b), d2, EXACT, "δ''");
                 let scalars = Vec3::new(m.rate, m.acceleration, 0.0);
                 close(scalars, Vec3::new(jet.length.d, jet.length.dd, 0.0), EXACT, "ℓ', ℓ''");
             }
@@ -104,8 +107,8 @@ fn leg_turning_is_the_derivative_of_the_leg_frame() {
                     angular = [angular[0] + x.cross(d) * 0.5, angular[1] + x.cross(dd) * 0.5];
                 }
                 let whole = leg::state(leg, &state);
-                close(whole.turn.omega, angular[0], EXACT, &format!("{name}: ω"));
-                close(whole.turn.eps, angular[1], 10.0 * EXACT, &format!("{name}: ε"));
+                close(whole.omega(), angular[0], EXACT, &format!("{name}: ω"));
+                close(whole.eps(), angular[1], 10.0 * EXACT, &format!("{name}: ε"));
             }
         }
     }
@@ -202,7 +205,8 @@ fn carrying_a_wrench_keeps_its_power() {
             for leg in &mech.legs {
                 let (force, torque) = (draw.vector(), draw.vector());
                 let whole = leg::state(leg, &state);
-                let power = force.dot(whole.end.v_b) + torque.dot(whole.turn.omega);
+                let v_b = whole.frame.axes.transpose_mul(whole.end.v_b);
+                let power = force.dot(v_b) + torque.dot(whole.turn.omega);
                 let carried = leg::carry(leg, &whole, force, torque).power(&state.twist);
                 assert!(
                     (carried - power).abs() <= EXACT * power.abs().max(1.0),
@@ -339,8 +343,7 @@ fn duals_differentiate_the_inverse_dynamics() {
 fn acceleration_from_the_legs_is_the_acceleration_of_the_platform() {
     for mech in mechanisms() {
         for state in samples(&mech) {
-            let motions: Vec<_> =
-                mech.actuated().map(|(_, leg)| leg::end(&leg::position(leg, &state.pose), &state)).collect();
+            let motions: Vec<_> = mech.actuated().map(|(_, leg)| leg::state(leg, &state).end).collect();
             let rates: Vec<f64> = motions.iter().map(|m| m.rate).collect();
             let seconds: Vec<f64> = motions.iter().map(|m| m.acceleration).collect();
             let (twist, pivots) = jacobian::platform_twist(&mech, &state.pose, &rates);

@@ -2,10 +2,15 @@
 
 mod common;
 
-use common::{every_leg, moving, on_rod, published, states, with_leg};
+use common::{every_leg, mechanisms, moving, on_rod, published, states, with_leg};
+use std::sync::Arc;
+
+use polypod_core::batch::{self, Loads, States};
+use polypod_core::clearance::Hull;
+use polypod_core::dynamics;
 use polypod_core::joints::{self, Zero};
 use polypod_core::leg;
-use polypod_core::limits::{Bound, Limit, Measure, binding, margins};
+use polypod_core::limits::{Bound, Limit, Measure, Strut, binding, margins};
 use polypod_core::mechanism::{Mechanism, Side};
 use polypod_core::spec::JointKind;
 
@@ -100,4 +105,73 @@ fn strokes_are_all_that_the_published_manipulator_has() {
     assert_eq!(binding(&mech, &found), Some(7));
     found[0] = f64::NAN;
     assert_eq!(binding(&mech, &found), None);
+}
+
+/// The mechanism with a limit of every kind that it can have; some hold and some do not.
+fn with_every_limit(mut mech: Mechanism) -> Mechanism {
+    let near = |measure: Measure, value: f64| {
+        [Bound::Least(value), Bound::Most(value)].map(|b| limit(measure.clone(), b))
+    };
+    let home = &states(&mech, 1, 9)[0];
+    let of_joints: Vec<Limit> = pairs(&mech, home)
+        .into_iter()
+        .flat_map(|(measure, [value, _])| match measure {
+            Measure::Angle(..) | Measure::RodAngle(..) => {
+                vec![limit(measure, Bound::Between(value - 0.1, value + 2.0))]
+            }
+            _ => near(measure, value).into(),
+        })
+        .collect();
+    let strut = |leg: usize, cut: [f64; 2]| Strut { leg, radius: 0.01, cut };
+    let mut others = Vec::new();
+    for i in 0..mech.legs.len() {
+        for j in 0..i {
+            let cut = if j == 0 { [0.1, 0.0] } else { [0.0, 0.05] };
+            others.push(Measure::Struts([strut(i, cut), strut(j, cut)]));
+        }
+    }
+    let points: Vec<_> = mech.legs.iter().map(|leg| leg.platform.point).collect();
+    for points in [&points[..], &points[..3.min(points.len())], &points[..2.min(points.len())]] {
+        let hull = Arc::new(Hull::of(points));
+        others.extend((0..mech.legs.len()).map(|i| Measure::Plate(strut(i, [0.0, 0.06]), Arc::clone(&hull))));
+    }
+    others.push(Measure::Conditioning);
+    others.extend(mech.actuated().enumerate().map(|(row, (leg, _))| Measure::Force { leg, row }));
+    mech.limits = of_joints;
+    mech.limits.extend(others.into_iter().flat_map(|measure| near(measure, 0.03)));
+    mech
+}
+
+#[test]
+fn margins_of_many_poses_are_those_of_each_bit_by_bit() {
+    let mut kinds = std::collections::BTreeSet::new();
+    for mech in mechanisms() {
+        let mech = with_every_limit(mech);
+        kinds.extend(mech.limits.iter().map(Limit::kind));
+        let motions = states(&mech, 11, 9);
+        let poses: Vec<f64> = motions.iter().flat_map(|s| s.pose.matrix()).collect();
+        let twists: Vec<f64> = motions.iter().flat_map(|s| s.twist.array()).collect();
+        let accelerations: Vec<f64> = motions.iter().flat_map(|s| s.acceleration.array()).collect();
+        let all = States { poses: &poses, twists: &twists, accelerations: &accelerations };
+        let table = batch::limits(&mech, &all, &Loads::Own);
+        let [together, relative, binds] = [0, 1, 2].map(|k| &table.fields[k].data);
+        let count = mech.limits.len();
+        let mut alone = vec![0.0; count];
+        for (i, motion) in motions.iter().enumerate() {
+            let load = dynamics::load_in_base(mech.load.wrench, mech.load.axes, &motion.pose);
+            let (forces, _) = dynamics::inverse_dynamics(&mech, motion, load);
+            margins(&mech, &motion.pose, Some(&forces), &mut alone);
+            let mut broken = 0;
+            for (k, (limit, margin)) in mech.limits.iter().zip(&alone).enumerate() {
+                let place = i * count + k;
+                assert_eq!(margin.to_bits(), limit.margin(&mech, &motion.pose, Some(&forces)).to_bits());
+                assert_eq!(margin.to_bits(), together[place].to_bits(), "{}: {limit:?}", mech.name);
+                assert_eq!((margin / limit.scale).to_bits(), relative[place].to_bits());
+                broken += usize::from(!(*margin >= 0.0));
+            }
+            assert!(table.status[i].stands() && broken > 0 && broken < count);
+            assert_eq!(binding(&mech, &alone), Some(binds[i] as usize), "{}", mech.name);
+        }
+    }
+    assert_eq!(kinds.len(), 12, "{kinds:?}");
 }

@@ -218,7 +218,10 @@ fn choices_are_least_and_differ_in_open_components_only() {
 fn joint_axes_are_right_handed() {
     for mech in mechanisms() {
         let places = reactions::places(&mech, &samples(&mech)[0].pose);
-        assert!(places.iter().all(|place| place.axes.rotation_error() < 1e-12), "{}", mech.name);
+        for axes in places.iter().map(|place| place.axes) {
+            let square = axes.departures().iter().all(|e| e.abs() < 1e-12);
+            assert!(square && axes.determinant() > 0.0, "{}", mech.name);
+        }
     }
 }
 

@@ -34,7 +34,7 @@ fn flooded(mech: &Mechanism, start: &Pose<f64>, step: f64, keep_aspect: bool) ->
 
 /// Every leg within its stroke and every constraint kept, from positions alone.
 fn assert_inside(mech: &Mechanism, pose: &Pose<f64>) {
-    assert!(pose.rotation.rotation_error() < 1e-12);
+    assert!(pose.rotation.departures().iter().all(|e| e.abs() < 1e-12) && pose.rotation.determinant() > 0.0);
     assert!(largest_distance(mech, pose) < 1e-12);
     for leg in &mech.legs {
         let length = leg::position(leg, pose).length;

@@ -2,7 +2,7 @@
 
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use polypod_core::batch;
-use polypod_core::inertial;
+use polypod_core::{geometry, inertial};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
@@ -45,6 +45,12 @@ pub fn regressor<'py>(
 ) -> PyResult<Bound<'py, PyDict>> {
     let motion = [&poses, &twists, &accelerations];
     mech.loaded(py, motion, wrenches.as_ref(), platform_axes, batch::regressors)
+}
+
+/// Names of the numbers of the geometry.
+#[pyfunction]
+pub fn geometry_parameters(mech: &PyMechanism) -> Vec<String> {
+    geometry::parameters(mech.core()).iter().map(|p| p.name(mech.core())).collect()
 }
 
 /// Names of the standard parameters, names of the file's numbers, values of the standard parameters.

@@ -13,6 +13,7 @@ use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray1};
 use polypod_core::assembly::assemble;
 use polypod_core::batch::{self, Coordinates, Loads, Space, States, Table};
 use polypod_core::coordinates::Set;
+use polypod_core::lanes;
 use polypod_core::limits::Limit;
 use polypod_core::mechanism::Mechanism;
 use polypod_core::modes::{self, Start};
@@ -22,9 +23,15 @@ use polypod_core::roots::{self, Node, Precision};
 use polypod_core::singularity::Kind;
 use polypod_core::spec::{Axes, Fault, Spec};
 use polypod_core::status::Status;
+use polypod_core::threads;
 use pyo3::exceptions::{PyKeyError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
+
+/// Keeps memory for the next results: the system's allocator gives that of large arrays back, and fetching it page by page
+/// costs more than filling it.
+#[global_allocator]
+static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
 
 pyo3::create_exception!(
     _core,
@@ -491,14 +498,16 @@ impl PyMechanism {
     }
 }
 
+/// Without twists and accelerations all is at rest.
 fn states<'a>(
     poses: &'a Array<'_>,
     twists: &'a Array<'_>,
     accelerations: &'a Array<'_>,
 ) -> PyResult<States<'a>> {
     let (poses, twists, accelerations) = (slice(poses)?, slice(twists)?, slice(accelerations)?);
-    expect(twists, 6, poses)?;
-    expect(accelerations, 6, poses)?;
+    for rates in [twists, accelerations] {
+        expect(rates, if rates.is_empty() { 0 } else { 6 }, poses)?;
+    }
     Ok(States { poses, twists, accelerations })
 }
 
@@ -547,6 +556,24 @@ fn statuses() -> Vec<(u8, String, &'static str)> {
     Status::ALL.iter().map(|&s| (s as u8, format!("{s:?}"), s.message())).collect()
 }
 
+/// Threads of batches; 0 for one on each core.
+#[pyfunction]
+fn set_threads(count: usize) {
+    threads::set(count);
+}
+
+/// Names of the instruction sets that batches can use here, the narrowest first.
+#[pyfunction]
+fn instruction_sets() -> Vec<&'static str> {
+    lanes::instruction_sets()
+}
+
+/// Whether this processor has the set; batches then use no wider registers than its.
+#[pyfunction]
+fn use_instructions(name: &str) -> bool {
+    lanes::use_instructions(name)
+}
+
 #[pymodule]
 fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add("__version__", env!("CARGO_PKG_VERSION"))?;
@@ -555,11 +582,15 @@ fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_function(wrap_pyfunction!(derivatives::inverse_dynamics_derivatives, m)?)?;
     m.add_function(wrap_pyfunction!(derivatives::regressor, m)?)?;
     m.add_function(wrap_pyfunction!(derivatives::inertial_parameters, m)?)?;
+    m.add_function(wrap_pyfunction!(derivatives::geometry_parameters, m)?)?;
     m.add_function(wrap_pyfunction!(derivatives::base_parameters, m)?)?;
     m.add_function(wrap_pyfunction!(workspace::fit_poses, m)?)?;
     m.add_class::<simulation::PyChart>()?;
     m.add_class::<workspace::PyFlood>()?;
     m.add_class::<workspace::PyLattice>()?;
+    m.add_function(wrap_pyfunction!(set_threads, m)?)?;
+    m.add_function(wrap_pyfunction!(instruction_sets, m)?)?;
+    m.add_function(wrap_pyfunction!(use_instructions, m)?)?;
     m.add_function(wrap_pyfunction!(zeros, m)?)?;
     m.add_function(wrap_pyfunction!(unsettled_zeros, m)?)?;
     m.add_function(wrap_pyfunction!(singularity_kinds, m)?)?;

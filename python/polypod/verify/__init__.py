@@ -1,9 +1,20 @@
 """The answers held against other engines, which know nothing of Polypod's equations.
 
-`verify` compares along a motion, `verify_states` at given states. The engines are installed by
-`pip install polypod[verify]`.
+`verify` compares along a motion, `verify_states` at given states; `integrate` applies the computed
+forces over time. The engines are installed by `pip install polypod[verify]`.
 """
 
+from polypod.verify.integrate import Integration, integrate
 from polypod.verify.table import ENGINES, TOLERANCE, Comparison, Row, Verification, verify, verify_states
 
-__all__ = ["ENGINES", "TOLERANCE", "Comparison", "Row", "Verification", "verify", "verify_states"]
+__all__ = [
+    "ENGINES",
+    "TOLERANCE",
+    "Comparison",
+    "Integration",
+    "Row",
+    "Verification",
+    "integrate",
+    "verify",
+    "verify_states",
+]

@@ -57,7 +57,7 @@ class Tree:
         """Pinocchio's joints of each body, one for each freedom."""
         self._carrier = {BASE: (0, np.eye(4))}
         """The joint that moves a body, and the body's frame in that joint's."""
-        self._zero = {BASE: np.eye(4)} | {body.name: body.zero for body in tree.bodies}
+        self._zero = tree.zero
         for body in tree.bodies:
             self._add(body)
         self.frames = {name: self._frame(name, name, np.zeros(3)) for name in self._zero}

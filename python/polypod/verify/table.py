@@ -12,10 +12,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from polypod.errors import MissingEngineError, PolypodError, ShapeError, UnknownNameError
-from polypod.mechanism import Mechanism
+from polypod.mechanism import Mechanism, check_wrench_axes
 from polypod.motion import Motion
 from polypod.solution import states_along
 from polypod.status import Status
+from polypod.verify.forced import pull
 from polypod.verify.tree import Multibody, describe
 
 Array = NDArray[np.float64]
@@ -26,14 +27,26 @@ TOLERANCE = 1e-9
 
 
 class Engine(NamedTuple):
-    """Another engine: how it is written, the module that it comes in, and the module here that drives it."""
+    """Another engine."""
 
     title: str
+    package: str
+    """To install, from PyPI."""
     module: str
+    """That it comes in."""
     driver: str
+    """The module here with its `Twin`."""
+    approximate: float | None = None
+    """Tolerance of an engine that is given Polypod's forces and answers with accelerations, all but exact.
+    None for one that is given the motion and answers exactly."""
 
 
-ENGINES = {"pinocchio": Engine("Pinocchio", "pinocchio", "polypod.verify.pinocchio")}
+ENGINES = {
+    "pinocchio": Engine("Pinocchio", "pin", "pinocchio", "polypod.verify.pinocchio"),
+    # Both give links without mass some. Exudyn's initial accelerations come from numerical differences.
+    "exudyn": Engine("Exudyn", "exudyn", "exudyn", "polypod.verify.exudyn", approximate=1e-6),
+    "mujoco": Engine("MuJoCo", "mujoco", "mujoco", "polypod.verify.mujoco", approximate=1e-6),
+}
 """The engines by the names that `verify` takes."""
 
 # name → words, unit, what errors are relative to
@@ -42,6 +55,8 @@ QUANTITIES: dict[str, tuple[str, str, str]] = {
     "lengths": ("leg lengths", "m", "length"),
     "rates": ("leg rates", "m/s", "speed"),
     "accelerations": ("leg accelerations", "m/s^2", "acceleration"),
+    "platform_acceleration": ("platform, accel.", "m/s^2", "acceleration"),
+    "platform_eps": ("platform, ang. accel.", "rad/s^2", "angular acceleration"),
     "leg_omega": ("legs, ang. velocity", "rad/s", "angular speed"),
     "leg_eps": ("legs, ang. accel.", "rad/s^2", "angular acceleration"),
     "piston_velocity": ("pistons, velocity", "m/s", "speed"),
@@ -57,7 +72,9 @@ QUANTITIES: dict[str, tuple[str, str, str]] = {
 
 RELATIVE_TO = (
     "the greatest value of the quantity among all parts at the same state, or where that is greater to the "
-    "platform's own motion there; constraint forces and torques also to the greatest active force"
+    "platform's own motion there; constraint forces and torques also to the greatest active force, "
+    "accelerations under given forces also to gravity, or where there is none to the load over the "
+    "platform's mass"
 )
 
 
@@ -72,6 +89,22 @@ class Twin(Protocol):
         self, pose: Array, twist: Array, acceleration: Array, wrench: Array
     ) -> tuple[dict[str, Any], Status]:
         """Quantities by name, as `QUANTITIES`, and whatever the engine can tell of its own accuracy."""
+
+
+class Driven(Protocol):
+    """What drives an engine that is given forces, those of `Engine.approximate`."""
+
+    version: str
+
+    def __init__(self, tree: Multibody) -> None: ...
+
+    def notes(self) -> list[str]:
+        """What to know of the engine's answers so far, in sentences."""
+
+    def answer(
+        self, pose: Array, twist: Array, wrench: Array, forces: Array
+    ) -> tuple[dict[str, Any], Status]:
+        """Quantities by name, as `QUANTITIES`, under a load and Polypod's forces."""
 
 
 class States(NamedTuple):
@@ -107,6 +140,10 @@ class Row:
     relative_max: float
     """Largest error as a part of what `RELATIVE_TO` says of its state."""
     relative_rms: float
+    tolerance: float
+    """Largest relative error that counts as agreement."""
+    approximate: bool
+    """Whether the tolerance is the engine's own, because it has no more digits."""
     part: str
     """The leg or rod with the largest relative error; empty for quantities of the whole."""
     index: int
@@ -133,6 +170,8 @@ class Comparison:
     """Largest error of a joint in the engine's solutions, a cosine or a part of the characteristic length."""
     agrees: bool
     """All states are compared, and no relative error exceeds the tolerance."""
+    notes: tuple[str, ...] = ()
+    """What to know of the engine's answers."""
 
 
 @dataclass(frozen=True)
@@ -166,6 +205,7 @@ class Verification:
                     "without_answer": dict(c.without_answer),
                     "closure": c.closure,
                     "agrees": c.agrees,
+                    "notes": list(c.notes),
                     "quantities": [
                         {
                             "quantity": row.quantity,
@@ -176,7 +216,9 @@ class Verification:
                             "greatest": _finite(row.greatest),
                             "relative_max": _finite(row.relative_max),
                             "relative_rms": _finite(row.relative_rms),
-                            "agrees": row.relative_max <= self.tolerance,
+                            "tolerance": row.tolerance,
+                            "approximate": row.approximate,
+                            "agrees": row.relative_max <= row.tolerance,
                             "worst": {
                                 "part": row.part,
                                 "state": row.index,
@@ -208,7 +250,8 @@ def verify(
         mech: the mechanism.
         motion: its motion; its own load, where it has one, stands for the mechanism's.
         engines: names of `ENGINES`.
-        tolerance: largest relative error that counts as agreement, a pure number.
+        tolerance: largest relative error that counts as agreement, a pure number; approximate engines have
+            their own, `Engine.approximate`.
         progress: called with the number of states done and of all.
 
     Raises:
@@ -250,7 +293,8 @@ def verify_states(
         wrench: load on the platform at o, (N, 6) or (6,), N and N m; the mechanism's own by default.
         wrench_axes: the axes of `wrench`, "base" or "platform".
         engines: names of `ENGINES`.
-        tolerance: largest relative error that counts as agreement, a pure number.
+        tolerance: largest relative error that counts as agreement, a pure number; approximate engines have
+            their own, `Engine.approximate`.
         progress: called with the number of states done and of all.
 
     Raises:
@@ -266,8 +310,7 @@ def _states(
     pose: ArrayLike, twist: ArrayLike, acceleration: ArrayLike, wrench: ArrayLike | None, wrench_axes: str
 ) -> States:
     """The arguments as arrays of the right shapes."""
-    if wrench_axes not in ("base", "platform"):
-        raise UnknownNameError("wrench_axes", wrench_axes, ("base", "platform"))
+    check_wrench_axes(wrench_axes)
     poses = np.asarray(pose, dtype=np.float64)
     if poses.ndim != 3 or poses.shape[1:] != (4, 4):
         raise ShapeError(f"pose has the shape {poses.shape}; needs (N, 4, 4)")
@@ -281,15 +324,14 @@ def _states(
     return States(poses, arrays["twist"], arrays["acceleration"], (arrays.get("wrench"), wrench_axes))
 
 
-def _load(tree: Multibody, states: States) -> Array:
-    """(N, 6): the load at o in base axes; the file's own where the states have none."""
-    wrench, axes = states.load
+def load_at_o(geometry: Mapping[str, Any], pose: Array, wrench: Array | None, axes: str) -> Array:
+    """(N, 6): the load at o in base axes at poses (N, 4, 4); the file's own where there is no wrench."""
     if wrench is None:
-        own = tree.geometry["load"]
+        own = geometry["load"]
         wrench, axes = np.array([*own["force"], *own["torque"]]), own["axes"]
-    load = np.broadcast_to(wrench, (len(states.pose), 6)).reshape(-1, 2, 3)
+    load = np.broadcast_to(wrench, (len(pose), 6)).reshape(-1, 2, 3)
     if axes == "platform":
-        load = np.einsum("nij,nkj->nki", states.pose[:, :3, :3], load)
+        load = np.einsum("nij,nkj->nki", pose[:, :3, :3], load)
     return load.reshape(-1, 6)
 
 
@@ -303,7 +345,7 @@ def _verify(
 ) -> Verification:
     if not 0.0 < tolerance < np.inf:
         raise PolypodError(f"tolerance is {tolerance!r}; must be a positive number")
-    twins = {name: _twin(name) for name in engines}
+    twins = {name: engine_class(name) for name in engines}
     if not twins:
         raise PolypodError(f"engines: there is none; valid: {', '.join(ENGINES)}")
     tree = describe(mech)
@@ -320,14 +362,19 @@ def _verify(
     return Verification(mech.name, motion, tolerance, tuple(comparisons))
 
 
-def _twin(name: str) -> type[Twin]:
-    """The class that drives an engine."""
+def engine_class(name: str) -> type[Twin] | type[Driven]:
+    """The class that drives an engine.
+
+    Raises:
+        UnknownNameError: no such engine.
+        MissingEngineError: it is not installed.
+    """
     if name not in ENGINES:
         raise UnknownNameError("engine", name, ENGINES)
     engine = ENGINES[name]
     if find_spec(engine.module) is None:
-        raise MissingEngineError(engine.title)
-    twin: type[Twin] = importlib.import_module(engine.driver).Twin
+        raise MissingEngineError(engine.title, engine.package)
+    twin: type[Twin] | type[Driven] = importlib.import_module(engine.driver).Twin
     return twin
 
 
@@ -343,6 +390,8 @@ def _own_answers(mech: Mechanism, states: States) -> tuple[Values, NDArray[np.in
     values: Values = {
         name: array for name, array in kinematics._asdict().items() if name in QUANTITIES and array.shape[1]
     }
+    values["platform_acceleration"] = states.acceleration[:, :3]
+    values["platform_eps"] = states.acceleration[:, 3:]
     values["freedoms"] = np.full(len(states.pose), float(mobility.dof + mobility.passive))
     values["forces"] = dynamics.forces
     rows = mech.jacobian(states.pose)[:, mech.dof :]
@@ -363,7 +412,7 @@ def _answers(status: NDArray[np.integer[Any]]) -> NDArray[np.bool_]:
 
 def _compare(
     name: str,
-    kind: type[Twin],
+    kind: type[Twin] | type[Driven],
     tree: Multibody,
     mech: Mechanism,
     states: States,
@@ -376,11 +425,14 @@ def _compare(
     without: dict[str, int] = {}
     both: list[int] = []
     closure = 0.0
-    twin = kind(tree)
-    for i, (pose, twist, acceleration, wrench) in enumerate(
-        zip(*states[:3], _load(tree, states), strict=True)
-    ):
-        found, status = twin.answer(pose, twist, acceleration, wrench)
+    twin: Any = kind(tree)
+    driven = ENGINES[name].approximate is not None
+    loads = load_at_o(tree.geometry, states.pose, *states.load)
+    for i, (pose, twist, acceleration) in enumerate(zip(*states[:3], strict=True)):
+        if driven:
+            found, status = twin.answer(pose, twist, loads[i], mine["forces"][i])
+        else:
+            found, status = twin.answer(pose, twist, acceleration, loads[i])
         closure = max(closure, found.get("closure", 0.0)) if status.has_answer else closure
         own = Status(int(own_status[i]))
         for who, outcome in (("Polypod", own), (ENGINES[name].title, status)):
@@ -395,13 +447,28 @@ def _compare(
     rows: tuple[Row, ...] = ()
     if both:
         values = {q: np.array([found[q] for found in theirs]) for q in mine if q in theirs[0]}
-        scales = _scales(mech, states, values, chosen)
+        weight = pull(tree, loads[chosen]) if driven else np.zeros(len(both))
+        scales = _scales(mech, states, mine["forces"][chosen], weight, chosen)
+        limit = ENGINES[name].approximate
+        # Counts are exact in any engine.
+        limits = {
+            q: (tolerance, False) if limit is None or q == "freedoms" else (limit, True) for q in values
+        }
         rows = tuple(
-            _row(mech, states, quantity, mine[quantity][chosen], values[quantity], scales, chosen)
+            _row(
+                mech,
+                states,
+                quantity,
+                mine[quantity][chosen],
+                values[quantity],
+                scales,
+                limits[quantity],
+                chosen,
+            )
             for quantity in QUANTITIES
             if quantity in values
         )
-    good = all(row.relative_max <= tolerance for row in rows)
+    good = all(row.relative_max <= row.tolerance for row in rows)
     return Comparison(
         ENGINES[name].title,
         twin.version,
@@ -411,6 +478,7 @@ def _compare(
         without,
         closure,
         good and bool(rows) and len(both) == len(states.pose),
+        tuple(twin.notes()) if driven else (),
     )
 
 
@@ -421,7 +489,9 @@ def _finite(value: float) -> float | None:
 # --- errors -------------------------------------------------------------------------------------------------
 
 
-def _scales(mech: Mechanism, states: States, theirs: Values, chosen: NDArray[np.int64]) -> dict[str, Array]:
+def _scales(
+    mech: Mechanism, states: States, forces: Array, weight: Array, chosen: NDArray[np.int64]
+) -> dict[str, Array]:
     """(N,): what each kind of quantity is at least compared with, so that rounding of zero is no error."""
     size = mech.characteristic_length
     twist, acceleration = states.twist[chosen], states.acceleration[chosen]
@@ -431,8 +501,8 @@ def _scales(mech: Mechanism, states: States, theirs: Values, chosen: NDArray[np.
         for part in (slice(0, 3), slice(3, 6))
     )
     speed = velocity + size * turning
-    gain = gain + size * turning_gain + speed**2 / size
-    force = np.max(np.abs(theirs["forces"]), axis=-1)
+    gain = gain + size * turning_gain + speed**2 / size + weight
+    force = np.max(np.abs(forces), axis=-1)
     return {
         "freedoms": np.ones(len(chosen)),
         "length": np.full(len(chosen), size),
@@ -461,6 +531,7 @@ def _row(
     mine: Array,
     theirs: Array,
     scales: Mapping[str, Array],
+    limit: tuple[float, bool],
     chosen: NDArray[np.int64],
 ) -> Row:
     title, unit, kind = QUANTITIES[quantity]
@@ -470,7 +541,7 @@ def _row(
         relative = np.where(errors == 0.0, 0.0, errors / reference)
     at, part = np.unravel_index(int(np.argmax(relative)), relative.shape)
     names = {"rod": mech.rod_names}.get(quantity[:3], mech.leg_names)
-    whole = quantity == "freedoms" or quantity.startswith("constraint")
+    whole = quantity == "freedoms" or quantity.startswith(("constraint", "platform"))
     i = int(chosen[at])
     return Row(
         quantity=quantity,
@@ -481,6 +552,8 @@ def _row(
         greatest=float(values.max()),
         relative_max=float(relative.max()),
         relative_rms=_rms(relative),
+        tolerance=limit[0],
+        approximate=limit[1],
         part="" if whole else names[int(part)],
         index=i,
         time=None if states.time is None else float(states.time[i]),

@@ -87,6 +87,8 @@ class LegParts:
     actuated: bool
     length: float
     """Distance from B to b where the joint is at zero, m."""
+    spins: bool
+    """Whether the leg may turn freely about its own axis."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,6 +104,11 @@ class Multibody:
     """What lengths are divided by where they stand beside angles, m."""
     geometry: Mapping[str, Any]
     """The mechanism file's numbers in SI, as `Mechanism.geometry`."""
+
+    @property
+    def zero(self) -> Placements:
+        """Frame (4, 4) of the base and of each body in base axes where all joints are at zero."""
+        return {BASE: np.eye(4)} | {body.name: body.zero for body in self.bodies}
 
     def start(self, pose: Array) -> Placements:
         """Frame (4, 4) of each body in base axes with the platform at `pose` (4, 4), from points and axes.
@@ -126,7 +133,8 @@ def describe(mech: Mechanism) -> Multibody:
         squares = _platform_squares(leg["platform"])
         closures.append(Closure(f"leg {leg['name']} platform joint", (piston, PLATFORM), ends, squares))
         length = float(np.linalg.norm(zero[piston][:3, 3] - zero[cylinder][:3, 3]))
-        parts.append(LegParts(leg["name"], cylinder, piston, leg["actuated"], length))
+        spins = turning_of(geometry, leg) is None
+        parts.append(LegParts(leg["name"], cylinder, piston, leg["actuated"], length, spins))
     bodies.append(_body(PLATFORM, BASE, zero, (Freedom("free", POINT),), geometry["platform"]))
     return Multibody(
         name=mech.name,

@@ -1,15 +1,18 @@
 //! Whether a state is one that the mechanism can be in: the checks that every operation makes of its input.
 
+use super::block::{At, Codes};
 use crate::constraint;
+use crate::forward_dynamics::square;
+use crate::lanes::Lanes;
 use crate::leg;
-use crate::limits::{self, Limit};
-use crate::mechanism::Mechanism;
-use crate::quadratic::quadratic;
-use crate::spatial::{Acceleration, Mat3, Pose, Twist, Vec3};
+use crate::limits::{Limit, Seen};
+use crate::mechanism::{Constraint, Mechanism, Turning};
+use crate::real::{Ordered, Real};
+use crate::spatial::{Mat3, Motion, Pose, Twist, Vec3};
 use crate::status::Status;
 
 /// Largest entry of `RᵀR - 1` for a rotation.
-pub(super) const ROTATION_TOLERANCE: f64 = 1e-6;
+const ROTATION_TOLERANCE: f64 = 1e-6;
 
 /// How far a pose may miss a constraint, relative to the characteristic length; for twists and accelerations
 /// relative to their own size.
@@ -20,93 +23,150 @@ pub const SINGULAR_PIVOTS: f64 = 1e-12;
 
 /// Sine of the angle between a leg and the axis of its universal joint, and length of a leg relative to the
 /// characteristic length, below which the leg has no frame.
-pub(super) const LEG_TOLERANCE: f64 = 1e-6;
-
-pub(super) fn six(values: &[f64], i: usize) -> [f64; 6] {
-    std::array::from_fn(|k| values[6 * i + k])
-}
+const LEG_TOLERANCE: f64 = 1e-6;
 
 pub(super) fn raw_pose(poses: &[f64], i: usize) -> Pose<f64> {
-    let m = &poses[16 * i..16 * i + 16];
+    pose_of(At::one(i).read(poses))
+}
+
+/// The pose of a homogeneous matrix, row by row.
+#[inline(always)]
+fn pose_of<V: Real>(m: [V; 16]) -> Pose<V> {
     Pose {
         rotation: Mat3::from_rows([[m[0], m[1], m[2]], [m[4], m[5], m[6]], [m[8], m[9], m[10]]]),
         o: Vec3::new(m[3], m[7], m[11]),
     }
 }
 
+/// Where all are finite: nothing times them is nothing.
+#[inline(always)]
+pub(super) fn finite<V: Ordered>(values: &[V]) -> V::Mask {
+    let mut sum = V::zero();
+    for x in values {
+        sum = sum + *x * V::zero();
+    }
+    sum.at_most(V::zero())
+}
+
+/// The pose of sixteen numbers, whether or not the mechanism can be in it.
+#[inline(always)]
+pub(super) fn any_pose<V: Lanes>(poses: &[f64], at: At) -> (Pose<V>, Codes<V>) {
+    let m: [V; 16] = at.read(poses);
+    let pose = pose_of(m);
+    let [x, y, z, one] = [m[12], m[13], m[14], m[15] - V::one()];
+    let last_row = x.abs() + y.abs() + z.abs() + one.abs();
+    let mut codes = Codes::ok()
+        .unless(finite(&m), Status::InvalidInput)
+        .unless(last_row.at_most(V::zero()), Status::InvalidInput)
+        .unless(pose.rotation.determinant().greater(V::zero()), Status::InvalidInput);
+    for e in pose.rotation.departures() {
+        codes = codes.unless(e.abs().at_most(V::lit(ROTATION_TOLERANCE)), Status::InvalidInput);
+    }
+    (pose, codes)
+}
+
 /// Whether sixteen numbers are a homogeneous matrix.
 pub(super) fn is_rotation(poses: &[f64], i: usize) -> bool {
-    let m = &poses[16 * i..16 * i + 16];
-    m.iter().all(|x| x.is_finite())
-        && m[12..] == [0.0, 0.0, 0.0, 1.0]
-        && raw_pose(poses, i).rotation.rotation_error() <= ROTATION_TOLERANCE
+    any_pose::<f64>(poses, At::one(i)).1.status() == Status::Ok
+}
+
+#[inline(always)]
+pub(super) fn pose_at<V: Lanes>(mech: &Mechanism, poses: &[f64], at: At) -> (Pose<V>, Codes<V>) {
+    let (pose, codes) = any_pose(poses, at);
+    (pose, kept(mech, &pose, with_legs(mech, &pose, codes)))
 }
 
 pub(super) fn read_pose(mech: &Mechanism, poses: &[f64], i: usize) -> (Pose<f64>, Status) {
-    let pose = raw_pose(poses, i);
-    let valid = is_rotation(poses, i);
-    let status = if valid { Status::Ok } else { Status::InvalidInput };
-    let status = then(status, || check_legs(mech, &pose));
-    (pose, then(status, || check_pose(mech, &pose)))
+    let (pose, codes) = pose_at::<f64>(mech, poses, At::one(i));
+    (pose, codes.status())
 }
 
 /// Whether every leg has a direction and a frame: no length of zero, no axis of a universal joint (or rod) along it.
+#[inline(always)]
+pub(super) fn with_legs<V: Lanes>(mech: &Mechanism, pose: &Pose<V>, mut codes: Codes<V>) -> Codes<V> {
+    let least = LEG_TOLERANCE * mech.characteristic_length;
+    for leg in &mech.legs {
+        let (_, r) = leg::vectors(leg, pose);
+        let square = r.dot(r);
+        codes = codes.unless(square.greater(V::lit(least * least)), Status::Singular);
+        if let Turning::Across(..) = leg.turning {
+            let (u, _) = leg::turning_axis(leg.turning, pose);
+            let across = u.cross(r);
+            let sine = across.dot(across);
+            codes = codes.unless(sine.greater(square.scale(LEG_TOLERANCE * LEG_TOLERANCE)), Status::Singular);
+        }
+    }
+    codes
+}
+
 pub(super) fn check_legs(mech: &Mechanism, pose: &Pose<f64>) -> Status {
-    let regular = mech.legs.iter().all(|leg| {
-        let p = leg::position(leg, pose);
-        let sine = leg::frame(leg, pose, &p).sine;
-        p.length > LEG_TOLERANCE * mech.characteristic_length && sine > LEG_TOLERANCE
-    });
-    if regular { Status::Ok } else { Status::Singular }
+    with_legs(mech, pose, Codes::ok()).status()
+}
+
+/// The square of what a constraint's value may be, of its rate beside a squared speed of one, and so on: as large as
+/// the tolerance makes a step along its row.
+#[inline(always)]
+fn square_tolerance<V: Lanes>(mech: &Mechanism, c: &Constraint, pose: &Pose<V>) -> V {
+    let square = constraint::square(&constraint::row(c, pose), mech.characteristic_length);
+    square.scale(CONSTRAINT_TOLERANCE * CONSTRAINT_TOLERANCE)
 }
 
 /// Whether a pose satisfies the constraints.
-pub(super) fn check_pose(mech: &Mechanism, pose: &Pose<f64>) -> Status {
-    let kept = constraint::largest_distance(mech, pose) <= CONSTRAINT_TOLERANCE * mech.characteristic_length;
-    if kept { Status::Ok } else { Status::OffConstraint }
-}
-
-/// Whether a twist keeps the constraints: `(c, τ)·V = 0`.
-pub(super) fn check_twist(mech: &Mechanism, pose: &Pose<f64>, twist: &Twist<f64>) -> Status {
-    let speed = speed(mech, twist);
-    let kept = mech.independent.iter().all(|c| {
-        let row = constraint::row(c, pose);
-        let size = constraint::row_size(&row, mech.characteristic_length);
-        row.power(twist).abs() <= CONSTRAINT_TOLERANCE * speed * size
-    });
-    match (speed.is_finite(), kept) {
-        (false, _) => Status::InvalidInput,
-        (true, false) => Status::OffConstraint,
-        (true, true) => Status::Ok,
+#[inline(always)]
+pub(super) fn kept<V: Lanes>(mech: &Mechanism, pose: &Pose<V>, mut codes: Codes<V>) -> Codes<V> {
+    for c in &mech.independent {
+        let (value, square) = (constraint::value(c, pose), square_tolerance(mech, c, pose));
+        codes = codes.unless((value * value).at_most(nearness(mech, square)), Status::OffConstraint);
     }
+    codes
 }
 
-/// Whether an acceleration keeps the constraints with that twist: `(c, τ)·A + Vᵀ h V = 0`.
-pub(super) fn check_acceleration(
+/// The same for values, which are lengths; a row that vanishes gives no distance.
+#[inline(always)]
+fn nearness<V: Lanes>(mech: &Mechanism, square: V) -> V {
+    let least = constraint::VANISHING_ROW * CONSTRAINT_TOLERANCE;
+    square.most(V::lit(least * least)).scale(mech.characteristic_length * mech.characteristic_length)
+}
+
+/// Whether a twist keeps the constraints: `ġ = (c, τ)·V = 0`.
+#[inline(always)]
+pub(super) fn with_twist<V: Lanes>(
     mech: &Mechanism,
-    pose: &Pose<f64>,
-    twist: &Twist<f64>,
-    a: &Acceleration<f64>,
-) -> Status {
-    let as_twist = Twist::new(a.a, a.eps);
-    let scale = mech.characteristic_length;
-    let (speed, second) = (speed(mech, twist), self::speed(mech, &as_twist));
-    let kept = mech.independent.iter().all(|c| {
-        let row = constraint::row(c, pose);
-        let size = constraint::row_size(&row, scale);
-        let g = row.power(&as_twist) + quadratic(&constraint::hessian(c, pose), &twist.array());
-        g.abs() <= CONSTRAINT_TOLERANCE * (second + speed * speed / scale) * size
-    });
-    match (second.is_finite(), kept) {
-        (false, _) => Status::InvalidInput,
-        (true, false) => Status::OffConstraint,
-        (true, true) => Status::Ok,
+    pose: &Pose<V>,
+    twist: &Twist<V>,
+    codes: Codes<V>,
+) -> Codes<V> {
+    let speed = square(mech, twist);
+    let mut codes = codes.unless(finite(&[speed]), Status::InvalidInput);
+    for c in &mech.independent {
+        let rate = constraint::row(c, pose).power(twist);
+        let most = speed * square_tolerance(mech, c, pose);
+        codes = codes.unless((rate * rate).at_most(most), Status::OffConstraint);
     }
+    codes
 }
 
-/// Size of a twist, turns counted as arcs at the characteristic length.
-pub(super) fn speed(mech: &Mechanism, twist: &Twist<f64>) -> f64 {
-    twist.v.norm() + twist.omega.norm() * mech.characteristic_length
+/// Whether pose, twist and acceleration keep the constraints: `g = ġ = g̈ = 0` \[T65\].
+#[inline(always)]
+pub(super) fn with_motion<V: Lanes>(mech: &Mechanism, platform: &Motion<V>, codes: Codes<V>) -> Codes<V> {
+    let Motion { pose, twist, acceleration } = platform;
+    let second = Twist::new(acceleration.a, acceleration.eps);
+    let (scale, speed) = (mech.characteristic_length, square(mech, twist));
+    let sum = square(mech, &second) + (speed * speed).scale(1.0 / (scale * scale));
+    let mut codes = codes.unless(finite(&[sum]), Status::InvalidInput);
+    let moving = platform.jets();
+    for c in &mech.independent {
+        let (g, square) = (constraint::value(c, &moving), square_tolerance(mech, c, pose));
+        codes = codes
+            .unless((g.x * g.x).at_most(nearness(mech, square)), Status::OffConstraint)
+            .unless((g.d * g.d).at_most(speed * square), Status::OffConstraint)
+            .unless((g.dd * g.dd).at_most(sum * square), Status::OffConstraint);
+    }
+    codes
+}
+
+pub(super) fn check_motion(mech: &Mechanism, platform: &Motion<f64>) -> Status {
+    with_motion(mech, platform, Codes::ok()).status()
 }
 
 /// The first of two outcomes that is not ok; the second is looked at only if the first is.
@@ -119,8 +179,18 @@ pub(super) fn check_finite(values: &[f64]) -> Status {
 }
 
 /// The first limit of a joint that a pose breaks.
+#[inline(always)]
+pub(super) fn within_limits<V: Lanes>(mech: &Mechanism, pose: &Pose<V>, mut codes: Codes<V>) -> Codes<V> {
+    let mut seen = Seen::default();
+    for limit in joint_limits(mech) {
+        let margin = limit.bound.margin(limit.of_joint(mech, pose, &mut seen));
+        codes = codes.unless(V::zero().at_most(margin), limit.status());
+    }
+    codes
+}
+
 pub(super) fn limit_status(mech: &Mechanism, pose: &Pose<f64>) -> Status {
-    limits::status(joint_limits(mech).map(|limit| (limit, limit.margin(mech, pose, None))))
+    within_limits(mech, pose, Codes::ok()).status()
 }
 
 /// The limits of joints, which come first in the list.
@@ -128,13 +198,28 @@ pub(super) fn joint_limits(mech: &Mechanism) -> impl Iterator<Item = &Limit> {
     mech.limits.iter().take_while(|limit| limit.status() != Status::Ok)
 }
 
+/// Whether a system was solved: the mechanism is controlled, the pivots tell a regular matrix, all is finite.
+#[inline(always)]
+pub(super) fn solved<V: Lanes>(mech: &Mechanism, solution: &[V], pivots: V, codes: Codes<V>) -> Codes<V> {
+    let least = if mech.mobility.uncontrolled == 0 { SINGULAR_PIVOTS } else { f64::INFINITY };
+    codes.unless(pivots.greater(V::lit(least)), Status::Singular).unless(finite(solution), Status::Singular)
+}
+
 pub(super) fn outcome(mech: &Mechanism, solution: &[f64; 6], pivots: f64) -> Status {
-    let controlled = mech.mobility.uncontrolled == 0;
-    if controlled && pivots > SINGULAR_PIVOTS && solution.iter().all(|x| x.is_finite()) {
-        Status::Ok
-    } else {
-        Status::Singular
+    solved(mech, solution, pivots, Codes::ok()).status()
+}
+
+/// One number of each actuated leg, of as many as there are legs; zero beyond.
+#[inline(always)]
+pub(super) fn actuated<V: Lanes>(mech: &Mechanism, values: &[f64], at: At) -> [V; 6] {
+    let (mut found, mut count) = ([V::zero(); 6], 0);
+    for k in 0..mech.legs.len() {
+        if mech.legs[k].actuated {
+            found[count] = at.read_one(values, mech.legs.len(), k);
+            count += 1;
+        }
     }
+    found
 }
 
 pub(super) fn actuated_values(mech: &Mechanism, values: &[f64], i: usize) -> Vec<f64> {

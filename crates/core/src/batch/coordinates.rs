@@ -1,13 +1,14 @@
 //! Coordinates of many states.
 
 use super::Table;
+use super::block::{self, Answers, At, Codes, Operation, Pieces};
 use super::checks::{
-    check_acceleration, check_legs, check_pose, check_twist, is_rotation, raw_pose, read_pose, then,
+    check_legs, check_motion, finite, is_rotation, raw_pose, read_pose, then, with_legs, with_motion,
 };
 use crate::coordinates::{self, MAX_COORDINATES, Set, State, Values};
+use crate::lanes::Lanes;
 use crate::mechanism::Mechanism;
-use crate::real::Jet;
-use crate::spatial::Motion;
+use crate::real::{Jet, Real};
 use crate::status::Status;
 
 /// Given coordinates of the states with their rates and second rates: `given[k]` holds the three series of the
@@ -27,74 +28,149 @@ pub struct Coordinates<'a> {
 #[must_use]
 pub fn states(mech: &Mechanism, input: &Coordinates, n: usize) -> Table {
     let names = input.set.names();
-    let (mut table, [poses, twists, accelerations, values, rates, second_rates]) = Table::new(
-        n,
-        [
-            ("pose", vec![4, 4]),
-            ("twist", vec![6]),
-            ("acceleration", vec![6]),
-            ("coordinates", vec![names.len()]),
-            ("coordinate_rates", vec![names.len()]),
-            ("coordinate_second_rates", vec![names.len()]),
-        ],
-    );
+    let fields = [
+        ("pose", vec![4, 4]),
+        ("twist", vec![6]),
+        ("acceleration", vec![6]),
+        ("coordinates", vec![names.len()]),
+        ("coordinate_rates", vec![names.len()]),
+        ("coordinate_second_rates", vec![names.len()]),
+    ];
+    let [poses, twists, accelerations, values, rates, second_rates] = block::fields();
     let mask: Vec<bool> =
         (0..MAX_COORDINATES).map(|k| k >= names.len() || input.given[k].is_some()).collect();
     let all_given = mask.iter().all(|&given| given) && !mech.independent.is_empty();
-    let (mut last, mut branch) = (mech.home, f64::NAN);
-    for i in 0..n {
-        let q: Values<Jet<f64>> = std::array::from_fn(|k| match input.given.get(k).copied().flatten() {
-            Some([x, d, dd]) => Jet::new(x[i], d[i], dd[i]),
-            None => Jet::new(0.0, 0.0, 0.0),
-        });
-        let guess = match input.guess {
-            Some(poses) if i == 0 || !input.continued => {
-                let k = if poses.len() == 16 { 0 } else { i };
-                if !is_rotation(poses, k) {
-                    table.status[i] = Status::InvalidInput;
-                    continue;
-                }
-                raw_pose(poses, k)
-            }
-            None if !input.continued => mech.home,
-            _ => last,
-        };
-        let state = coordinates::state(mech, &input.set, &q, &mask, input.branch, &guess);
-        let state = checked(mech, state, all_given);
-        let jumped = input.continued && state.status == Status::Ok && state.branch * branch < 0.0;
-        table.status[i] = if jumped { Status::BranchJump } else { state.status };
-        let found = state.platform.pose.rotation.0.iter().all(|c| c.norm().is_finite());
-        let solved = found && matches!(table.status[i], Status::Ok | Status::Fold);
-        if solved {
-            if state.status == Status::Ok {
-                (last, branch) = (state.platform.pose, state.branch);
-            }
-            table.set(poses, i, 0, &state.platform.pose.matrix());
-        }
-        if table.status[i] == Status::Ok {
-            table.set(twists, i, 0, &state.platform.twist.array());
-            table.set(accelerations, i, 0, &state.platform.acceleration.array());
-        }
-        for k in 0..names.len() {
-            if solved || mask[k] {
-                let jet = state.coordinates[k];
-                table.set(values, i, k, &[jet.x]);
-                table.set(rates, i, k, &[jet.d]);
-                table.set(second_rates, i, k, &[jet.dd]);
-            }
-        }
+    let solved = match input.set {
+        Set::Paper(_) => false,
+        _ => mask.contains(&false),
+    };
+    if !solved && !input.continued && input.guess.is_none() {
+        return block::table(&Closed { mech, input, all_given }, n, fields);
     }
-    table
+    let pieces = if input.continued { Pieces::WHOLE } else { Pieces::QUICK };
+    block::in_pieces(n, fields, pieces, |rows, states| {
+        let (mut last, mut branch) = (mech.home, f64::NAN);
+        for i in states {
+            let q: Values<Jet<f64>> = std::array::from_fn(|k| match input.given.get(k).copied().flatten() {
+                Some([x, d, dd]) => Jet::new(x[i], d[i], dd[i]),
+                None => Jet::new(0.0, 0.0, 0.0),
+            });
+            let guess = match input.guess {
+                Some(poses) if i == 0 || !input.continued => {
+                    let k = if poses.len() == 16 { 0 } else { i };
+                    if !is_rotation(poses, k) {
+                        rows.set_status(i, Status::InvalidInput);
+                        continue;
+                    }
+                    raw_pose(poses, k)
+                }
+                None if !input.continued => mech.home,
+                _ => last,
+            };
+            let state = coordinates::state(mech, &input.set, &q, &mask, input.branch, &guess);
+            let state = checked(mech, state, all_given);
+            let jumped = input.continued && state.status == Status::Ok && state.branch * branch < 0.0;
+            let status = if jumped { Status::BranchJump } else { state.status };
+            rows.set_status(i, status);
+            let found = state.platform.pose.rotation.0.iter().all(|c| c.norm().is_finite());
+            let solved = found && matches!(status, Status::Ok | Status::Fold);
+            if solved {
+                if state.status == Status::Ok {
+                    (last, branch) = (state.platform.pose, state.branch);
+                }
+                rows.set(poses, i, 0, &state.platform.pose.matrix());
+            }
+            if status == Status::Ok {
+                rows.set(twists, i, 0, &state.platform.twist.array());
+                rows.set(accelerations, i, 0, &state.platform.acceleration.array());
+            }
+            for k in 0..names.len() {
+                if solved || mask[k] {
+                    let jet = state.coordinates[k];
+                    rows.set(values, i, k, &[jet.x]);
+                    rows.set(rates, i, k, &[jet.d]);
+                    rows.set(second_rates, i, k, &[jet.dd]);
+                }
+            }
+        }
+    })
+}
+
+/// States whose coordinates are all given or follow in closed form.
+struct Closed<'a> {
+    mech: &'a Mechanism,
+    input: &'a Coordinates<'a>,
+    /// Whether constraints are left to be kept by the given coordinates.
+    all_given: bool,
+}
+
+impl Operation<6> for Closed<'_> {
+    #[inline(always)]
+    fn run<V: Lanes>(&self, at: At, answers: &mut Answers<'_, 6>) -> Codes<V> {
+        let (mech, input) = (self.mech, self.input);
+        let [poses, twists, accelerations, values, rates, second_rates] = Answers::fields();
+        let (mut q, nan) = ([Jet::lit(0.0); MAX_COORDINATES], V::lit(f64::NAN));
+        let mut codes = Codes::ok();
+        for k in 0..input.given.len() {
+            if let Some([x, d, dd]) = input.given[k] {
+                q[k] = Jet::new(at.series(x), at.series(d), at.series(dd));
+                codes = codes.unless(finite(&[q[k].x, q[k].d, q[k].dd]), Status::InvalidInput);
+            }
+        }
+        let [pose, regular] = coordinates::complete(mech, &input.set, &mut q, input.branch);
+        codes = codes.unless(pose.0, pose.1).unless(regular.0, regular.1);
+        let platform = coordinates::motion(&input.set.pose(mech, &q));
+        codes = with_legs(mech, &platform.pose, codes);
+        if self.all_given {
+            codes = with_motion(mech, &platform, codes);
+        }
+        // Where branches meet the pose stands without its rates.
+        let [x, y, z] = platform.pose.rotation.0;
+        let found = finite(&[x.norm(), y.norm(), z.norm()]);
+        let (ok, fold) = (codes.are(Status::Ok), codes.are(Status::Fold));
+        let mut matrix = [V::zero(); 16];
+        matrix[15] = V::one();
+        for (j, column) in [x, y, z, platform.pose.o].into_iter().enumerate() {
+            let column = column.array();
+            for i in 0..3 {
+                matrix[4 * i + j] = column[i];
+            }
+        }
+        for i in 0..16 {
+            let standing = V::select(ok, matrix[i], V::select(fold, matrix[i], nan));
+            matrix[i] = V::select(found, standing, nan);
+        }
+        let (mut twist, mut acceleration) = (platform.twist.array(), platform.acceleration.array());
+        for i in 0..6 {
+            twist[i] = V::select(ok, twist[i], nan);
+            acceleration[i] = V::select(ok, acceleration[i], nan);
+        }
+        answers.put(poses, 0, matrix);
+        answers.put(twists, 0, twist);
+        answers.put(accelerations, 0, acceleration);
+        for k in 0..input.given.len() {
+            let mut parts = [q[k].x, q[k].d, q[k].dd];
+            if input.given[k].is_none() {
+                for part in &mut parts {
+                    let standing = V::select(ok, *part, V::select(fold, *part, nan));
+                    *part = V::select(found, standing, nan);
+                }
+            }
+            answers.put(values, k, [parts[0]]);
+            answers.put(rates, k, [parts[1]]);
+            answers.put(second_rates, k, [parts[2]]);
+        }
+        codes.answered()
+    }
 }
 
 /// A state is none where a leg has no frame, or where coordinates that were all given break the constraints.
 fn checked(mech: &Mechanism, mut state: State, all_given: bool) -> State {
-    let Motion { pose, twist, acceleration } = &state.platform;
+    let pose = &state.platform.pose;
     // A root that a constraint has only because a leg has no frame there is none.
     state.status = then(state.status, || check_legs(mech, pose));
     if all_given && state.status == Status::Ok {
-        state.status = then(check_pose(mech, pose), || check_twist(mech, pose, twist));
-        state.status = then(state.status, || check_acceleration(mech, pose, twist, acceleration));
+        state.status = check_motion(mech, &state.platform);
     }
     state
 }
@@ -103,13 +179,12 @@ fn checked(mech: &Mechanism, mut state: State, all_given: bool) -> State {
 #[must_use]
 pub fn coordinate_values(mech: &Mechanism, set: &Set, poses: &[f64]) -> Table {
     let n = poses.len() / 16;
-    let (mut table, [values]) = Table::new(n, [("coordinates", vec![set.names().len()])]);
-    for i in 0..n {
+    let (fields, [values]) = ([("coordinates", vec![set.names().len()])], block::fields());
+    block::one_by_one(n, fields, Pieces::QUICK, |rows, i| {
         let (pose, status) = read_pose(mech, poses, i);
-        table.status[i] = status;
         if status == Status::Ok {
-            table.set(values, i, 0, &set.values(mech, &pose)[..set.names().len()]);
+            rows.set(values, i, 0, &set.values(mech, &pose)[..set.names().len()]);
         }
-    }
-    table
+        status
+    })
 }

@@ -1,13 +1,15 @@
 //! Dynamics of many states.
 
-use super::checks::{check_finite, limit_status, outcome, read_pose, six, then};
+use super::block::{self, Answers, At, Codes, Operation, Pieces};
+use super::checks::{check_finite, limit_status, outcome, read_pose, solved, then, within_limits};
 use super::{FieldId, States, Table};
 use crate::dynamics;
+use crate::lanes::Lanes;
 use crate::leg;
 use crate::mechanism::Mechanism;
 use crate::mobility;
-use crate::real::{Dual, Real};
-use crate::spatial::{Motion, Pose, Twist, Wrench};
+use crate::real::Dual;
+use crate::spatial::{Motion, Pose, Twist, Vec3, Wrench};
 use crate::spec::Axes;
 use crate::status::Status;
 
@@ -19,43 +21,64 @@ pub enum Loads<'a> {
 }
 
 impl Loads<'_> {
-    pub(super) fn at<T: Real>(&self, mech: &Mechanism, pose: &Pose<T>, i: usize) -> Wrench<T> {
-        let (wrench, axes) = match self {
-            Loads::Own => (mech.load.wrench, mech.load.axes),
-            Loads::Given(values, axes) => (Wrench::from_array(six(values, i)), *axes),
-        };
-        dynamics::load_in_base(Wrench::from_array(wrench.array().map(T::lit)), axes, pose)
+    #[inline(always)]
+    pub(super) fn of<V: Lanes>(&self, mech: &Mechanism, pose: &Pose<V>, at: At) -> Wrench<V> {
+        let (wrench, axes) = self.given(mech, at);
+        dynamics::load_in_base(wrench, axes, pose)
+    }
+
+    /// As they are given, with their axes.
+    #[inline(always)]
+    pub(super) fn given<V: Lanes>(&self, mech: &Mechanism, at: At) -> (Wrench<V>, Axes) {
+        match self {
+            Loads::Own => {
+                let own = mech.load.wrench;
+                (Wrench::new(Vec3::lift(own.force), Vec3::lift(own.torque)), mech.load.axes)
+            }
+            Loads::Given(values, axes) => (Wrench::from_array(at.read(values)), *axes),
+        }
     }
 }
 
 /// Active forces of all legs (zero for passive ones) and multipliers of the independent constraints [Eq. 43].
 #[must_use]
 pub fn inverse_dynamics(mech: &Mechanism, states: &States, loads: &Loads) -> Table {
-    let n = states.len();
-    let (mut table, [forces, multipliers]) =
-        Table::new(n, [("forces", vec![mech.legs.len()]), ("constraint", vec![mech.independent.len()])]);
-    for i in 0..n {
-        let (platform, load, mut status) = states.read_loaded(mech, loads, i);
-        if status == Status::Ok {
-            let (f, pivots) = dynamics::inverse_dynamics(mech, &platform, load);
-            status = outcome(mech, &f, pivots);
-            if status == Status::Ok {
-                status = limit_status(mech, &platform.pose);
-                put_forces(mech, &mut table, forces, i, &f);
-                table.set(multipliers, i, 0, &f[mech.dof()..]);
-            }
-        }
-        table.status[i] = status;
-    }
-    table
+    let fields = [("forces", vec![mech.legs.len()]), ("constraint", vec![mech.independent.len()])];
+    block::table(&InverseDynamics { mech, states, loads }, states.len(), fields)
 }
 
-fn put_forces(mech: &Mechanism, table: &mut Table, field: FieldId, state: usize, forces: &[f64; 6]) {
-    for k in 0..mech.legs.len() {
-        table.set(field, state, k, &[0.0]);
+struct InverseDynamics<'a> {
+    mech: &'a Mechanism,
+    states: &'a States<'a>,
+    loads: &'a Loads<'a>,
+}
+
+impl Operation<2> for InverseDynamics<'_> {
+    #[inline(always)]
+    fn run<V: Lanes>(&self, at: At, answers: &mut Answers<'_, 2>) -> Codes<V> {
+        let (mech, [forces, multipliers]) = (self.mech, Answers::fields());
+        let (platform, load, codes) = self.states.loaded_at(mech, self.loads, at);
+        let (f, pivots) = dynamics::inverse_dynamics(mech, &platform, load);
+        put_forces(mech, answers, forces, &f);
+        for k in 0..mech.independent.len() {
+            answers.put(multipliers, k, [f[mech.dof() + k]]);
+        }
+        within_limits(mech, &platform.pose, solved(mech, &f, pivots, codes))
     }
-    for ((k, _), f) in mech.actuated().zip(forces) {
-        table.set(field, state, k, &[*f]);
+}
+
+/// Active forces of all legs, zero for passive ones.
+#[inline(always)]
+fn put_forces<V: Lanes, const N: usize>(
+    mech: &Mechanism,
+    answers: &mut Answers<'_, N>,
+    field: FieldId,
+    forces: &[V; 6],
+) {
+    let mut row = 0;
+    for (k, leg) in mech.legs.iter().enumerate() {
+        answers.put(field, k, [if leg.actuated { forces[row] } else { V::zero() }]);
+        row += usize::from(leg.actuated);
     }
 }
 
@@ -71,21 +94,22 @@ pub fn coupled_forces(
     let (pair, axis, platform_axis) = mobility::coupled_pair(mech)?;
     let index = mech.independent.iter().position(|c| pair.contains(&c.leg))?;
     let (n, k) = (poses.len() / 16, mech.independent.len());
-    let (mut table, [forces, torque]) = Table::new(n, [("forces", vec![2]), ("torque", vec![])]);
-    for i in 0..n {
+    let (fields, [forces, torque]) = ([("forces", vec![2]), ("torque", vec![])], block::fields());
+    let table = block::one_by_one(n, fields, Pieces::QUICK, |rows, i| {
         let (pose, status) = read_pose(mech, poses, i);
         let f_c = multipliers[i * k + index];
-        table.status[i] = then(status, || check_finite(&[f_c]));
-        if table.status[i] == Status::Ok {
-            let c = dynamics::coupled_forces(mech, pair, axis, platform_axis, &pose, f_c, as_printed);
-            if c.forces.iter().all(|f| f.is_finite()) {
-                table.set(forces, i, 0, &c.forces);
-                table.set(torque, i, 0, &[c.torque]);
-            } else {
-                table.status[i] = Status::Singular;
-            }
+        let status = then(status, || check_finite(&[f_c]));
+        if status != Status::Ok {
+            return status;
         }
-    }
+        let c = dynamics::coupled_forces(mech, pair, axis, platform_axis, &pose, f_c, as_printed);
+        if !c.forces.iter().all(|f| f.is_finite()) {
+            return Status::Singular;
+        }
+        rows.set(forces, i, 0, &c.forces);
+        rows.set(torque, i, 0, &[c.torque]);
+        Status::Ok
+    });
     Some((pair, table))
 }
 
@@ -104,13 +128,13 @@ pub fn power(mech: &Mechanism, states: &States, loads: &Loads) -> Table {
         "friction",
         "residual",
     ];
-    let (mut table, ids) = Table::new(n, names.map(|name| (name, vec![])));
-    for i in 0..n {
-        let (platform, wrench, status) = states.read_loaded(mech, loads, i);
+    let ids: [FieldId; 9] = block::fields();
+    let fields = names.map(|name| (name, vec![]));
+    block::one_by_one(n, fields, Pieces::QUICK, |rows, i| {
+        let (platform, wrench, status) = states.one(mech, loads, i);
         let Motion { pose, twist, .. } = &platform;
-        table.status[i] = status;
-        if table.status[i] != Status::Ok {
-            continue;
+        if status != Status::Ok {
+            return status;
         }
         let (kinetic, potential) = energy_along(mech, &platform);
         let load = wrench.power(twist);
@@ -118,8 +142,8 @@ pub fn power(mech: &Mechanism, states: &States, loads: &Loads) -> Table {
             + mech.angular_damping * twist.omega.dot(twist.omega));
         let (f, pivots) = dynamics::inverse_dynamics(mech, &platform, wrench);
         let rates = mech.actuated().map(|(_, leg)| leg::row(&leg::position(leg, pose)).power(twist));
-        table.status[i] = then(outcome(mech, &f, pivots), || limit_status(mech, pose));
-        let singular = table.status[i] == Status::Singular;
+        let status = then(outcome(mech, &f, pivots), || limit_status(mech, pose));
+        let singular = status == Status::Singular;
         let actuators = if singular { f64::NAN } else { rates.zip(&f).map(|(rate, f)| rate * f).sum() };
         // What the efficiency takes: actuators serve the platform's term of [Eq. 42] 1/η times.
         let own = (wrench + dynamics::platform_wrench(mech, &platform)).power(twist);
@@ -127,11 +151,11 @@ pub fn power(mech: &Mechanism, states: &States, loads: &Loads) -> Table {
         let residual = actuators + load + damping + friction - kinetic.d - potential.d;
         let values =
             [kinetic.x, potential.x, kinetic.d, potential.d, actuators, load, damping, friction, residual];
-        for (id, value) in ids.iter().zip(values) {
-            table.set(*id, i, 0, &[value]);
+        for (id, value) in ids.into_iter().zip(values) {
+            rows.set(id, i, 0, &[value]);
         }
-    }
-    table
+        status
+    })
 }
 
 /// Kinetic and potential energy as duals along the motion.

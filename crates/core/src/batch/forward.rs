@@ -1,7 +1,8 @@
 //! Forward kinematics of many states.
 
+use super::Table;
+use super::block::{self, Pieces, Rows};
 use super::checks::{actuated_values, check_legs, is_rotation, joint_limits, raw_pose, then};
-use super::{FieldId, Table};
 use crate::forward::{self, Found};
 use crate::forward_lanes::forward_kinematics_of;
 use crate::lanes::WIDTH;
@@ -29,63 +30,62 @@ pub fn forward_kinematics(
             is_rotation(guesses, k).then(|| raw_pose(guesses, k))
         }
     };
-    let mut solutions = Solutions::new(n);
+    let fields = [("pose", vec![4, 4]), ("residual", vec![]), ("iterations", vec![])];
+    let asked = |i: usize| actuated_values(mech, lengths, i);
     if !continued {
-        let states: Vec<(usize, Pose<f64>)> = (0..n).filter_map(|i| Some((i, guess(i)?))).collect();
-        for states in states.chunks(WIDTH) {
-            let asked: Vec<(Vec<f64>, Pose<f64>)> =
-                states.iter().map(|&(i, guess)| (actuated_values(mech, lengths, i), guess)).collect();
-            for (&(i, _), found) in states.iter().zip(forward_kinematics_of(mech, &asked)) {
-                solutions.set(mech, i, &found);
+        return block::in_pieces(n, fields, IN_LANES, |rows, piece| {
+            let valid = |i: usize| {
+                let guess = guess(i);
+                rows.set_status(i, Status::InvalidInput);
+                Some((i, guess?))
+            };
+            let states: Vec<(usize, Pose<f64>)> = piece.filter_map(valid).collect();
+            for states in states.chunks(WIDTH) {
+                let asked: Vec<_> = states.iter().map(|&(i, guess)| (asked(i), guess)).collect();
+                for (&(i, _), found) in states.iter().zip(forward_kinematics_of(mech, &asked)) {
+                    put_found(mech, rows, i, &found);
+                }
             }
-        }
-        return solutions.table;
+        });
     }
-    // The last pose that was solved, and the one of the state before it.
-    let (mut last, mut before, mut solved) = (None, None, false);
-    for i in 0..n {
-        let Some(guess) = last.or_else(|| guess(i)) else { continue };
-        let values = actuated_values(mech, lengths, i);
-        let mut found = forward::forward_kinematics(mech, &values, &guess);
-        if let (Some(last), Some(before), Status::Ok) = (last, before, found.status) {
-            found = forward::passed(mech, &values, &before, &last, &found).unwrap_or(found);
+    block::in_pieces(n, fields, Pieces::WHOLE, |rows, states| {
+        // The last pose that was solved, and the one of the state before it.
+        let (mut last, mut before, mut solved) = (None, None, false);
+        for i in states {
+            let Some(guess) = last.or_else(|| guess(i)) else {
+                rows.set_status(i, Status::InvalidInput);
+                continue;
+            };
+            let values = asked(i);
+            let mut found = forward::forward_kinematics(mech, &values, &guess);
+            if let (Some(last), Some(before), Status::Ok) = (last, before, found.status) {
+                found = forward::passed(mech, &values, &before, &last, &found).unwrap_or(found);
+            }
+            let status = put_found(mech, rows, i, &found);
+            let unsolved = [Status::NotConverged, Status::InvalidInput, Status::Singular, Status::ModeJump]
+                .contains(&status);
+            (last, before) =
+                if unsolved { (last, None) } else { (Some(found.pose), last.filter(|_| solved)) };
+            solved = !unsolved;
         }
-        let status = solutions.set(mech, i, &found);
-        let unsolved = [Status::NotConverged, Status::InvalidInput, Status::Singular, Status::ModeJump]
-            .contains(&status);
-        (last, before) = if unsolved { (last, None) } else { (Some(found.pose), last.filter(|_| solved)) };
-        solved = !unsolved;
-    }
-    solutions.table
+    })
 }
 
-/// The table of poses found; a state that is not set has an invalid guess.
-struct Solutions {
-    table: Table,
-    fields: [FieldId; 3],
-}
+/// So many lengths at least are worth a thread of their own.
+const IN_LANES: Pieces = Pieces { least: 32, unit: WIDTH };
 
-impl Solutions {
-    fn new(n: usize) -> Self {
-        let names = [("pose", vec![4, 4]), ("residual", vec![]), ("iterations", vec![])];
-        let (mut table, fields) = Table::new(n, names);
-        table.status.fill(Status::InvalidInput);
-        Solutions { table, fields }
+/// Writes down what was found, with its status.
+fn put_found(mech: &Mechanism, rows: &mut Rows<'_, 3>, i: usize, found: &Found) -> Status {
+    let Found { pose, residual, iterations, .. } = *found;
+    let status = then(found.status, || check_found(mech, &pose, residual));
+    let [poses, residuals, counts] = block::fields();
+    rows.set_status(i, status);
+    if !matches!(status, Status::NotConverged | Status::InvalidInput) {
+        rows.set(poses, i, 0, &pose.matrix());
+        rows.set(residuals, i, 0, &[residual]);
     }
-
-    /// The status of what was found, which is written down.
-    fn set(&mut self, mech: &Mechanism, i: usize, found: &Found) -> Status {
-        let Found { pose, residual, iterations, .. } = *found;
-        let status = then(found.status, || check_found(mech, &pose, residual));
-        let ([poses, residuals, counts], table) = (self.fields, &mut self.table);
-        table.status[i] = status;
-        if !matches!(status, Status::NotConverged | Status::InvalidInput) {
-            table.set(poses, i, 0, &pose.matrix());
-            table.set(residuals, i, 0, &[residual]);
-        }
-        table.set(counts, i, 0, &[f64::from(iterations)]);
-        status
-    }
+    rows.set(counts, i, 0, &[f64::from(iterations)]);
+    status
 }
 
 /// Whether a pose that was found is one that the mechanism can be in, and within its limits. A root that a constraint
@@ -113,22 +113,22 @@ pub struct AllModes {
 #[must_use]
 pub fn assembly_modes(mech: &Mechanism, start: &Start, lengths: &[f64]) -> AllModes {
     let n = lengths.len() / mech.legs.len();
-    let found: Vec<modes::Modes> =
-        (0..n).map(|i| modes::assembly_modes(mech, start, &actuated_values(mech, lengths, i))).collect();
+    let found = block::each(n, |i| modes::assembly_modes(mech, start, &actuated_values(mech, lengths, i)));
     let all: Vec<&modes::Mode> = found.iter().flat_map(|f| &f.modes).collect();
-    let names = ["determinant_sign", "above", "multiplicity", "residual"].map(|name| (name, vec![]));
-    let [sign, above, multiplicity, residual] = names;
-    let (mut table, [poses, sign, above, multiplicity, residual]) =
-        Table::new(all.len(), [("pose", vec![4, 4]), sign, above, multiplicity, residual]);
-    for (i, mode) in all.iter().enumerate() {
-        table.set(poses, i, 0, &mode.pose.matrix());
-        table.set(sign, i, 0, &[if mode.singular { 0.0 } else { mode.sign }]);
-        table.set(above, i, 0, &[f64::from(u8::from(mode.above))]);
-        table.set(multiplicity, i, 0, &[f64::from(mode.multiplicity)]);
-        table.set(residual, i, 0, &[mode.residual]);
+    let [sign, above, multiplicity, residual] =
+        ["determinant_sign", "above", "multiplicity", "residual"].map(|name| (name, vec![]));
+    let fields = [("pose", vec![4, 4]), sign, above, multiplicity, residual];
+    let [poses, sign, above, multiplicity, residual] = block::fields();
+    let table = block::one_by_one(all.len(), fields, Pieces::QUICK, |rows, i| {
+        let mode = all[i];
+        rows.set(poses, i, 0, &mode.pose.matrix());
+        rows.set(sign, i, 0, &[if mode.singular { 0.0 } else { mode.sign }]);
+        rows.set(above, i, 0, &[f64::from(u8::from(mode.above))]);
+        rows.set(multiplicity, i, 0, &[f64::from(mode.multiplicity)]);
+        rows.set(residual, i, 0, &[mode.residual]);
         let status = if mode.singular { Status::Singular } else { Status::Ok };
-        table.status[i] = then(status, || check_found(mech, &mode.pose, mode.residual));
-    }
+        then(status, || check_found(mech, &mode.pose, mode.residual))
+    });
     let counts = found.iter().map(|f| f.modes.len()).collect();
     AllModes { modes: table, counts, status: found.iter().map(|f| f.status).collect() }
 }

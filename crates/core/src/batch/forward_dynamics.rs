@@ -1,12 +1,12 @@
 //! Forward dynamics of many states.
 
-use super::checks::{
-    SINGULAR_PIVOTS, actuated_values, check_finite, check_twist, limit_status, read_pose, six, then,
-};
+use super::block::{self, Answers, At, Codes, Operation, Pieces, Rows};
+use super::checks::{SINGULAR_PIVOTS, actuated, finite, limit_status, pose_at, with_twist, within_limits};
 use super::dynamics::Loads;
 use super::{FieldId, Table};
 use crate::coordinates::Set;
 use crate::forward_dynamics::{self, Equations};
+use crate::lanes::Lanes;
 use crate::leg;
 use crate::mechanism::Mechanism;
 use crate::nearest::{self, Search};
@@ -15,9 +15,9 @@ use crate::status::Status;
 
 /// Pose and twist of a state, and whether it is one that the mechanism can be in.
 fn read(mech: &Mechanism, poses: &[f64], twists: &[f64], i: usize) -> (Pose<f64>, Twist<f64>, Status) {
-    let (pose, status) = read_pose(mech, poses, i);
-    let twist = Twist::from_array(six(twists, i));
-    (pose, twist, then(status, || check_twist(mech, &pose, &twist)))
+    let (pose, codes) = pose_at::<f64>(mech, poses, At::one(i));
+    let twist = Twist::from_array(At::one(i).read(twists));
+    (pose, twist, with_twist(mech, &pose, &twist, codes).status())
 }
 
 /// Accelerations of the platform and multipliers of the independent constraints from the forces of all legs; those of
@@ -30,27 +30,40 @@ pub fn forward_dynamics(
     forces: &[f64],
     loads: &Loads,
 ) -> Table {
-    let n = poses.len() / 16;
-    let (mut table, [acceleration, multipliers]) =
-        Table::new(n, [("acceleration", vec![6]), ("constraint", vec![mech.independent.len()])]);
-    for i in 0..n {
-        let (pose, twist, status) = read(mech, poses, twists, i);
-        let (load, push) = (loads.at(mech, &pose, i), actuated_values(mech, forces, i));
-        let mut status = then(status, || check_finite(&load.array()));
-        status = then(status, || check_finite(&push));
-        if status == Status::Ok {
-            let driven = forward_dynamics::forward_dynamics(mech, &pose, &twist, &push, load);
-            let a = driven.acceleration.array();
-            status = Status::Singular;
-            if driven.pivots > SINGULAR_PIVOTS && a.iter().all(|x| x.is_finite()) {
-                status = limit_status(mech, &pose);
-                table.set(acceleration, i, 0, &a);
-                table.set(multipliers, i, 0, &driven.multipliers[..mech.independent.len()]);
-            }
+    let fields = [("acceleration", vec![6]), ("constraint", vec![mech.independent.len()])];
+    let operation = ForwardDynamics { mech, poses, twists, forces, loads };
+    block::table(&operation, poses.len() / 16, fields)
+}
+
+struct ForwardDynamics<'a> {
+    mech: &'a Mechanism,
+    poses: &'a [f64],
+    twists: &'a [f64],
+    forces: &'a [f64],
+    loads: &'a Loads<'a>,
+}
+
+impl Operation<2> for ForwardDynamics<'_> {
+    #[inline(always)]
+    fn run<V: Lanes>(&self, at: At, answers: &mut Answers<'_, 2>) -> Codes<V> {
+        let (mech, [acceleration, multipliers]) = (self.mech, Answers::fields());
+        let (pose, codes) = pose_at(mech, self.poses, at);
+        let twist = Twist::from_array(at.read(self.twists));
+        let (load, push) = (self.loads.of(mech, &pose, at), actuated(mech, self.forces, at));
+        let codes = with_twist(mech, &pose, &twist, codes)
+            .unless(finite(&load.array()), Status::InvalidInput)
+            .unless(finite(&push), Status::InvalidInput);
+        let driven = forward_dynamics::forward_dynamics::<V>(mech, &pose, &twist, &push, load);
+        let a = driven.acceleration.array();
+        answers.put(acceleration, 0, a);
+        for k in 0..mech.independent.len() {
+            answers.put(multipliers, k, [driven.multipliers[k]]);
         }
-        table.status[i] = status;
+        let codes = codes
+            .unless(driven.pivots.greater(V::lit(SINGULAR_PIVOTS)), Status::Singular)
+            .unless(finite(&a), Status::Singular);
+        within_limits(mech, &pose, codes)
     }
-    table
 }
 
 /// What the equations of motion are written in: twists, or given coordinates of a set.
@@ -73,30 +86,26 @@ impl Space {
 #[must_use]
 pub fn equations_of_motion(mech: &Mechanism, poses: &[f64], twists: &[f64], space: &Space) -> Table {
     let (n, d) = (poses.len() / 16, space.size());
-    let (mut table, ids) = Table::new(
-        n,
-        [
-            ("mass", vec![d, d]),
-            ("coriolis", vec![d, d]),
-            ("damping", vec![d, d]),
-            ("gravity", vec![d]),
-            ("twist_jacobian", vec![6, d]),
-            ("leg_jacobian", vec![mech.legs.len(), d]),
-            ("rates", vec![d]),
-        ],
-    );
-    for i in 0..n {
+    let fields = [
+        ("mass", vec![d, d]),
+        ("coriolis", vec![d, d]),
+        ("damping", vec![d, d]),
+        ("gravity", vec![d]),
+        ("twist_jacobian", vec![6, d]),
+        ("leg_jacobian", vec![mech.legs.len(), d]),
+        ("rates", vec![d]),
+    ];
+    block::one_by_one(n, fields, Pieces::SLOW, |rows, i| {
         let (pose, twist, status) = read(mech, poses, twists, i);
         let found = if status == Status::Ok { equations(mech, &pose, &twist, space) } else { Err(status) };
-        table.status[i] = match found {
+        match found {
             Ok((e, rates)) => {
-                put(mech, &mut table, ids, i, (&e, &rates), &pose);
+                put(mech, rows, i, (&e, &rates), &pose);
                 limit_status(mech, &pose)
             }
             Err(status) => status,
-        };
-    }
-    table
+        }
+    })
 }
 
 fn equations(
@@ -118,29 +127,28 @@ fn equations(
 
 fn put(
     mech: &Mechanism,
-    table: &mut Table,
-    ids: [FieldId; 7],
+    rows: &mut Rows<'_, 7>,
     i: usize,
     (e, rates): (&Equations<f64>, &[f64; 6]),
     pose: &Pose<f64>,
 ) {
-    let d = e.count;
+    let (d, ids): (_, [FieldId; 7]) = (e.count, block::fields());
     for (id, matrix) in ids.into_iter().zip([&e.mass, &e.coriolis, &e.damping]) {
         for (k, row) in matrix[..d].iter().enumerate() {
-            table.set(id, i, k, &row[..d]);
+            rows.set(id, i, k, &row[..d]);
         }
     }
-    table.set(ids[3], i, 0, &e.gravity[..d]);
+    rows.set(ids[3], i, 0, &e.gravity[..d]);
     for (j, twist) in e.twists[..d].iter().enumerate() {
         for (k, x) in twist.array().into_iter().enumerate() {
-            table.set(ids[4], i, k * d + j, &[x]);
+            rows.set(ids[4], i, k * d + j, &[x]);
         }
     }
     for (k, leg) in mech.legs.iter().enumerate() {
         let row = leg::row(&leg::position(leg, pose));
         for (j, twist) in e.twists[..d].iter().enumerate() {
-            table.set(ids[5], i, k * d + j, &[row.power(twist)]);
+            rows.set(ids[5], i, k * d + j, &[row.power(twist)]);
         }
     }
-    table.set(ids[6], i, 0, &rates[..d]);
+    rows.set(ids[6], i, 0, &rates[..d]);
 }

@@ -1,169 +1,216 @@
 //! Kinematics of many states.
 
-use super::checks::{
-    actuated_values, check_finite, check_twist, is_rotation, limit_status, outcome, raw_pose, read_pose, six,
-    then,
-};
+use super::block::{self, Answers, At, Codes, Operation};
+use super::checks::{actuated, any_pose, finite, pose_at, solved, with_twist, within_limits};
 use super::{States, Table};
 use crate::jacobian;
 use crate::joints::{self, Zero};
+use crate::lanes::Lanes;
 use crate::leg;
 use crate::mechanism::Mechanism;
-use crate::spatial::Twist;
+use crate::spatial::{Twist, Vec3};
 use crate::status::Status;
 
 /// Lengths, vectors r and directions δ of all legs [Eq. 3].
 #[must_use]
 pub fn inverse_kinematics(mech: &Mechanism, poses: &[f64]) -> Table {
-    let (states, legs) = (poses.len() / 16, mech.legs.len());
-    let (mut table, [lengths, vectors, directions]) = Table::new(
-        states,
-        [("lengths", vec![legs]), ("vectors", vec![legs, 3]), ("directions", vec![legs, 3])],
-    );
-    for i in 0..states {
-        let (pose, mut status) = read_pose(mech, poses, i);
-        if status == Status::Ok {
-            status = limit_status(mech, &pose);
-            for (k, leg) in mech.legs.iter().enumerate() {
-                let p = leg::position(leg, &pose);
-                table.set(lengths, i, k, &[p.length]);
-                table.set(vectors, i, k, &p.r.array());
-                table.set(directions, i, k, &p.delta.array());
-            }
+    let legs = mech.legs.len();
+    let fields = [("lengths", vec![legs]), ("vectors", vec![legs, 3]), ("directions", vec![legs, 3])];
+    block::table(&InverseKinematics { mech, poses }, poses.len() / 16, fields)
+}
+
+struct InverseKinematics<'a> {
+    mech: &'a Mechanism,
+    poses: &'a [f64],
+}
+
+impl Operation<3> for InverseKinematics<'_> {
+    #[inline(always)]
+    fn run<V: Lanes>(&self, at: At, answers: &mut Answers<'_, 3>) -> Codes<V> {
+        let (mech, [lengths, vectors, directions]) = (self.mech, Answers::fields());
+        let (pose, codes) = pose_at(mech, self.poses, at);
+        for (k, leg) in mech.legs.iter().enumerate() {
+            let p = leg::position(leg, &pose);
+            answers.put(lengths, k, [p.length]);
+            answers.put(vectors, k, p.r.array());
+            answers.put(directions, k, p.delta.array());
         }
-        table.status[i] = status;
+        within_limits(mech, &pose, codes)
     }
-    table
 }
 
 /// J for each pose, constraint satisfied or not [Eq. 13].
 #[must_use]
 pub fn jacobians(mech: &Mechanism, poses: &[f64]) -> Table {
-    let states = poses.len() / 16;
-    let (mut table, [matrix]) = Table::new(states, [("jacobian", vec![6, 6])]);
-    for i in 0..states {
-        if !is_rotation(poses, i) {
-            continue;
+    block::table(&Jacobians { mech, poses }, poses.len() / 16, [("jacobian", vec![6, 6])])
+}
+
+struct Jacobians<'a> {
+    mech: &'a Mechanism,
+    poses: &'a [f64],
+}
+
+impl Operation<1> for Jacobians<'_> {
+    #[inline(always)]
+    fn run<V: Lanes>(&self, at: At, answers: &mut Answers<'_, 1>) -> Codes<V> {
+        let (pose, codes) = any_pose(self.poses, at);
+        let [matrix] = Answers::fields();
+        let rows = jacobian::jacobian(self.mech, &pose);
+        for k in 0..6 {
+            answers.put(matrix, k, rows[k]);
         }
-        for (k, row) in jacobian::jacobian(mech, &raw_pose(poses, i)).iter().enumerate() {
-            table.set(matrix, i, k, row);
-        }
+        codes
     }
-    table
 }
 
 /// H for each pose, constraint satisfied or not [Eq. 19].
 #[must_use]
 pub fn hessians(mech: &Mechanism, poses: &[f64]) -> Table {
-    let states = poses.len() / 16;
-    let (mut table, [layers]) = Table::new(states, [("hessian", vec![6, 6, 6])]);
-    for i in 0..states {
-        if !is_rotation(poses, i) {
-            continue;
+    block::table(&Hessians { mech, poses }, poses.len() / 16, [("hessian", vec![6, 6, 6])])
+}
+
+struct Hessians<'a> {
+    mech: &'a Mechanism,
+    poses: &'a [f64],
+}
+
+impl Operation<1> for Hessians<'_> {
+    #[inline(always)]
+    fn run<V: Lanes>(&self, at: At, answers: &mut Answers<'_, 1>) -> Codes<V> {
+        let (pose, codes) = any_pose(self.poses, at);
+        let [layers] = Answers::fields();
+        let found = jacobian::hessian(self.mech, &pose);
+        for k in 0..6 {
+            for i in 0..6 {
+                answers.put(layers, 6 * k + i, found[k][i]);
+            }
         }
-        for (k, row) in jacobian::hessian(mech, &raw_pose(poses, i)).as_flattened().iter().enumerate() {
-            table.set(layers, i, k, row);
-        }
+        codes
     }
-    table
 }
 
 /// Every quantity of legs, rods, cylinders, pistons and joints [Eq. 2-39].
 #[must_use]
 pub fn kinematics(mech: &Mechanism, states: &States) -> Table {
-    let (n, legs, rods) = (states.len(), mech.legs.len(), mech.rods.len());
+    let (legs, rods) = (mech.legs.len(), mech.rods.len());
     let (scalar, vector, pair) = (|| vec![legs], || vec![legs, 3], || vec![legs, 2]);
-    let (mut table, ids) = Table::new(
-        n,
-        [
-            ("lengths", scalar()),
-            ("rates", scalar()),
-            ("accelerations", scalar()),
-            ("directions", vector()),
-            ("leg_omega", vector()),
-            ("leg_eps", vector()),
-            ("leg_spin", scalar()),
-            ("leg_spin_rate", scalar()),
-            ("piston_velocity", vector()),
-            ("piston_acceleration", vector()),
-            ("cylinder_velocity", vector()),
-            ("cylinder_acceleration", vector()),
-            ("base_joint_angles", pair()),
-            ("base_joint_rates", pair()),
-            ("platform_joint_angles", pair()),
-            ("platform_joint_rates", pair()),
-            ("base_cone_angle", scalar()),
-            ("platform_cone_angle", scalar()),
-            ("rod_angle", vec![rods]),
-            ("rod_omega", vec![rods, 3]),
-            ("rod_eps", vec![rods, 3]),
-        ],
-    );
+    let fields = [
+        ("lengths", scalar()),
+        ("rates", scalar()),
+        ("accelerations", scalar()),
+        ("directions", vector()),
+        ("leg_omega", vector()),
+        ("leg_eps", vector()),
+        ("leg_spin", scalar()),
+        ("leg_spin_rate", scalar()),
+        ("piston_velocity", vector()),
+        ("piston_acceleration", vector()),
+        ("cylinder_velocity", vector()),
+        ("cylinder_acceleration", vector()),
+        ("base_joint_angles", pair()),
+        ("base_joint_rates", pair()),
+        ("platform_joint_angles", pair()),
+        ("platform_joint_rates", pair()),
+        ("base_cone_angle", scalar()),
+        ("platform_cone_angle", scalar()),
+        ("rod_angle", vec![rods]),
+        ("rod_omega", vec![rods, 3]),
+        ("rod_eps", vec![rods, 3]),
+    ];
     let zeros: Vec<Zero> = mech.legs.iter().map(|leg| Zero::of(leg, &mech.home)).collect();
-    for i in 0..n {
-        let (platform, status) = states.read(mech, i);
-        table.status[i] = then(status, || limit_status(mech, &platform.pose));
-        if status != Status::Ok {
-            continue;
-        }
-        for (k, leg) in mech.legs.iter().enumerate() {
+    block::table(&Kinematics { mech, states, zeros: &zeros }, states.len(), fields)
+}
+
+struct Kinematics<'a> {
+    mech: &'a Mechanism,
+    states: &'a States<'a>,
+    zeros: &'a [Zero],
+}
+
+impl Operation<21> for Kinematics<'_> {
+    #[inline(always)]
+    fn run<V: Lanes>(&self, at: At, answers: &mut Answers<'_, 21>) -> Codes<V> {
+        let mech = self.mech;
+        let (platform, codes) = self.states.at(mech, at);
+        for (k, (leg, zero)) in mech.legs.iter().zip(self.zeros).enumerate() {
             let state = leg::state(leg, &platform);
             let leg::State { position: p, end, turn, frame } = &state;
             let (piston, cylinder) = (leg::piston(leg, &state), leg::cylinder(leg, &state));
-            let [below, above] = joints::angles(leg, &zeros[k], &platform, &state);
-            let values: [&[f64]; 18] = [
-                &[p.length],
-                &[end.rate],
-                &[end.acceleration],
-                &p.delta.array(),
-                &turn.omega.array(),
-                &turn.eps.array(),
-                &[turn.spin],
-                &[turn.spin_rate],
-                &piston.velocity.array(),
-                &piston.acceleration.array(),
-                &cylinder.velocity.array(),
-                &cylinder.acceleration.array(),
-                &below.angles,
-                &below.rates,
-                &above.angles,
-                &above.rates,
-                &[below.cone],
-                &[above.cone],
-            ];
-            for (id, value) in ids.iter().zip(values) {
-                table.set(*id, i, k, value);
-            }
+            let [below, above] = joints::angles(leg, zero, &platform, &state);
+            let [
+                lengths,
+                rates,
+                accelerations,
+                directions,
+                leg_omega,
+                leg_eps,
+                leg_spin,
+                leg_spin_rate,
+                piston_velocity,
+                piston_acceleration,
+                cylinder_velocity,
+                cylinder_acceleration,
+                base_joint_angles,
+                base_joint_rates,
+                platform_joint_angles,
+                platform_joint_rates,
+                base_cone_angle,
+                platform_cone_angle,
+                rod_angle,
+                rod_omega,
+                rod_eps,
+            ] = Answers::fields();
+            answers.put(lengths, k, [p.length]);
+            answers.put(rates, k, [end.rate]);
+            answers.put(accelerations, k, [end.acceleration]);
+            answers.put(directions, k, p.delta.array());
+            answers.put(leg_omega, k, state.omega().array());
+            answers.put(leg_eps, k, state.eps().array());
+            answers.put(leg_spin, k, [turn.spin]);
+            answers.put(leg_spin_rate, k, [turn.spin_rate]);
+            answers.put(piston_velocity, k, piston.velocity.array());
+            answers.put(piston_acceleration, k, piston.acceleration.array());
+            answers.put(cylinder_velocity, k, cylinder.velocity.array());
+            answers.put(cylinder_acceleration, k, cylinder.acceleration.array());
+            answers.put(base_joint_angles, k, below.angles);
+            answers.put(base_joint_rates, k, below.rates);
+            answers.put(platform_joint_angles, k, above.angles);
+            answers.put(platform_joint_rates, k, above.rates);
+            answers.put(base_cone_angle, k, [below.cone]);
+            answers.put(platform_cone_angle, k, [above.cone]);
             for (r, rod) in mech.rods.iter().enumerate().filter(|(_, rod)| rod.leader == k) {
-                let rod_turn = leg::rod_turn(rod.axis, &state);
-                table.set(ids[18], i, r, &[joints::rod_angle(mech, r, &zeros[k], frame.n())]);
-                table.set(ids[19], i, r, &(rod.axis * rod_turn.rate).array());
-                table.set(ids[20], i, r, &(rod.axis * rod_turn.acceleration).array());
+                let (axis, turn) = (Vec3::lift(rod.axis), leg::rod_turn(Vec3::lift(rod.axis), &state));
+                answers.put(rod_angle, r, [joints::rod_angle(mech, r, zero, frame.n())]);
+                answers.put(rod_omega, r, (axis * turn.rate).array());
+                answers.put(rod_eps, r, (axis * turn.acceleration).array());
             }
         }
+        within_limits(mech, &platform.pose, codes)
     }
-    table
 }
 
 /// The platform's twist from the rates of all legs; those of passive legs are not read [Eq. 13].
 #[must_use]
 pub fn platform_twist(mech: &Mechanism, poses: &[f64], rates: &[f64]) -> Table {
-    let n = poses.len() / 16;
-    let (mut table, [field]) = Table::new(n, [("twist", vec![6])]);
-    for i in 0..n {
-        let (pose, status) = read_pose(mech, poses, i);
-        let legs = actuated_values(mech, rates, i);
-        let mut status = then(status, || check_finite(&legs));
-        if status == Status::Ok {
-            let (twist, pivots) = jacobian::platform_twist(mech, &pose, &legs);
-            status = outcome(mech, &twist.array(), pivots);
-            if status == Status::Ok {
-                table.set(field, i, 0, &twist.array());
-            }
-        }
-        table.status[i] = status;
+    block::table(&PlatformTwist { mech, poses, rates }, poses.len() / 16, [("twist", vec![6])])
+}
+
+struct PlatformTwist<'a> {
+    mech: &'a Mechanism,
+    poses: &'a [f64],
+    rates: &'a [f64],
+}
+
+impl Operation<1> for PlatformTwist<'_> {
+    #[inline(always)]
+    fn run<V: Lanes>(&self, at: At, answers: &mut Answers<'_, 1>) -> Codes<V> {
+        let (mech, [field]) = (self.mech, Answers::fields());
+        let (pose, codes) = pose_at(mech, self.poses, at);
+        let legs = actuated(mech, self.rates, at);
+        let (twist, pivots) = jacobian::platform_twist(mech, &pose, &legs);
+        answers.put(field, 0, twist.array());
+        solved(mech, &twist.array(), pivots, codes.unless(finite(&legs), Status::InvalidInput))
     }
-    table
 }
 
 /// The platform's acceleration from its twist and the accelerations of all legs [Eq. 19].
@@ -174,22 +221,27 @@ pub fn platform_acceleration(
     twists: &[f64],
     accelerations: &[f64],
 ) -> Table {
-    let n = poses.len() / 16;
-    let (mut table, [field]) = Table::new(n, [("acceleration", vec![6])]);
-    for i in 0..n {
-        let (pose, status) = read_pose(mech, poses, i);
-        let twist = Twist::from_array(six(twists, i));
-        let legs = actuated_values(mech, accelerations, i);
-        let status = then(status, || check_twist(mech, &pose, &twist));
-        let mut status = then(status, || check_finite(&legs));
-        if status == Status::Ok {
-            let (a, pivots) = jacobian::platform_acceleration(mech, &pose, &twist, &legs);
-            status = outcome(mech, &a.array(), pivots);
-            if status == Status::Ok {
-                table.set(field, i, 0, &a.array());
-            }
-        }
-        table.status[i] = status;
+    let operation = PlatformAcceleration { mech, poses, twists, accelerations };
+    block::table(&operation, poses.len() / 16, [("acceleration", vec![6])])
+}
+
+struct PlatformAcceleration<'a> {
+    mech: &'a Mechanism,
+    poses: &'a [f64],
+    twists: &'a [f64],
+    accelerations: &'a [f64],
+}
+
+impl Operation<1> for PlatformAcceleration<'_> {
+    #[inline(always)]
+    fn run<V: Lanes>(&self, at: At, answers: &mut Answers<'_, 1>) -> Codes<V> {
+        let (mech, [field]) = (self.mech, Answers::fields());
+        let (pose, codes) = pose_at(mech, self.poses, at);
+        let twist = Twist::from_array(at.read(self.twists));
+        let legs = actuated(mech, self.accelerations, at);
+        let codes = with_twist(mech, &pose, &twist, codes).unless(finite(&legs), Status::InvalidInput);
+        let (a, pivots) = jacobian::platform_acceleration(mech, &pose, &twist, &legs);
+        answers.put(field, 0, a.array());
+        solved(mech, &a.array(), pivots, codes)
     }
-    table
 }

@@ -1,50 +1,64 @@
 //! Limits of many states.
 
-use super::checks::outcome;
+use super::block::{self, Answers, At, Codes, Operation};
+use super::checks::solved;
 use super::dynamics::Loads;
 use super::{States, Table};
 use crate::dynamics;
-use crate::limits::{self, Measure};
+use crate::lanes::Lanes;
+use crate::limits::{Binding, Measure, Seen};
 use crate::mechanism::Mechanism;
-use crate::spatial::{Motion, Wrench};
 use crate::status::Status;
 
-/// Signed slack of every limit, the same relative to the limit's scale, and the number of the limit that binds \[T35\].
-/// Forces are those of the motion; where they are not determined their margins are NaN and no limit binds.
+/// Signed slack of every limit, the same relative to the limit's scale, the number of the limit that binds, and 1 where
+/// all are kept \[T35\]. Forces are those of the motion; where they are not determined their margins are NaN and no limit
+/// binds.
 #[must_use]
 pub fn limits(mech: &Mechanism, states: &States, loads: &Loads) -> Table {
-    let (n, m) = (states.len(), mech.limits.len());
-    let (mut table, [margins, relative, binding]) =
-        Table::new(n, [("margins", vec![m]), ("relative", vec![m]), ("binding", vec![])]);
-    let needs_forces = mech.limits.iter().any(|limit| matches!(limit.measure, Measure::Force { .. }));
-    let mut found = vec![0.0; m];
-    for i in 0..n {
-        let (platform, load, status) = states.read_loaded(mech, loads, i);
-        table.status[i] = status;
-        if status != Status::Ok {
-            continue;
-        }
-        let forces = if needs_forces { forces(mech, &platform, load) } else { None };
-        limits::margins(mech, &platform.pose, forces.as_ref(), &mut found);
-        table.status[i] = if needs_forces && forces.is_none() {
-            Status::Singular
-        } else {
-            limits::status(mech.limits.iter().zip(found.iter().copied()))
-        };
-        table.set(margins, i, 0, &found);
-        if let Some(k) = limits::binding(mech, &found) {
-            table.set(binding, i, 0, &[k as f64]);
-        }
-        for (margin, limit) in found.iter_mut().zip(&mech.limits) {
-            *margin /= limit.scale;
-        }
-        table.set(relative, i, 0, &found);
-    }
-    table
+    let count = mech.limits.len();
+    let fields =
+        [("margins", vec![count]), ("relative", vec![count]), ("binding", vec![]), ("within", vec![])];
+    let forces = mech.limits.iter().any(|limit| matches!(limit.measure, Measure::Force { .. }));
+    block::table(&Limits { mech, states, loads, forces }, states.len(), fields)
 }
 
-/// Active forces, where they are determined.
-fn forces(mech: &Mechanism, platform: &Motion<f64>, load: Wrench<f64>) -> Option<[f64; 6]> {
-    let (f, pivots) = dynamics::inverse_dynamics(mech, platform, load);
-    (outcome(mech, &f, pivots) == Status::Ok).then_some(f)
+struct Limits<'a> {
+    mech: &'a Mechanism,
+    states: &'a States<'a>,
+    loads: &'a Loads<'a>,
+    /// Whether there are limits of forces.
+    forces: bool,
+}
+
+impl Operation<4> for Limits<'_> {
+    #[inline(always)]
+    fn run<V: Lanes>(&self, at: At, answers: &mut Answers<'_, 4>) -> Codes<V> {
+        let (mech, [margins, relatives, binding, within]) = (self.mech, Answers::fields());
+        let (platform, load, mut codes) = self.states.loaded_at(mech, self.loads, at);
+        let mut forces = [V::lit(f64::NAN); 6];
+        if self.forces {
+            let (f, pivots) = dynamics::inverse_dynamics(mech, &platform, load);
+            let determined = solved(mech, &f, pivots, Codes::<V>::ok()).are(Status::Ok);
+            for k in 0..6 {
+                forces[k] = V::select(determined, f[k], forces[k]);
+            }
+            codes = codes.but(determined, Status::Singular);
+        }
+        let (mut seen, mut binds, mut kept) = (Seen::default(), Binding::default(), V::one());
+        for (k, limit) in mech.limits.iter().enumerate() {
+            let margin = limit.margin_at(mech, &platform.pose, &forces, &mut seen);
+            let relative = margin / V::lit(limit.scale);
+            answers.put(margins, k, [margin]);
+            answers.put(relatives, k, [relative]);
+            binds = binds.or(k, relative);
+            let holds = V::zero().at_most(margin);
+            kept = V::select(holds, kept, V::zero());
+            if limit.status() != Status::Ok {
+                codes = codes.unless(holds, limit.status());
+            }
+        }
+        answers.put(binding, 0, [binds.limit]);
+        answers.put(within, 0, [kept]);
+        codes
+    }
 }

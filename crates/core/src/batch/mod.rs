@@ -1,5 +1,6 @@
 //! Many states at once: arrays in, a [`Table`] out, one status per state, NaN where there is no answer.
 
+mod block;
 mod checks;
 mod coordinates;
 mod derivatives;
@@ -25,10 +26,12 @@ pub use singularity::{conditioning, determinants, nearest_singular, searched_coo
 pub use limits::limits;
 pub use reactions::joint_reactions;
 
+use crate::lanes::Lanes;
 use crate::mechanism::Mechanism;
 use crate::spatial::{Acceleration, Motion, Pose, Twist, Wrench};
 use crate::status::Status;
-use checks::{check_acceleration, check_finite, check_twist, read_pose, six, then};
+use block::{At, Codes};
+use checks::{any_pose, finite, with_legs, with_motion};
 
 /// One output array: its row for a state has the given shape.
 #[derive(Clone, Debug)]
@@ -47,7 +50,7 @@ pub fn pose_of(matrix: &[f64]) -> Pose<f64> {
     checks::raw_pose(matrix, 0)
 }
 
-/// Named output arrays over the states, all NaN until set.
+/// Named output arrays over the states; NaN where there is no answer.
 #[derive(Clone, Debug)]
 pub struct Table {
     pub fields: Vec<Field>,
@@ -58,26 +61,8 @@ pub struct Table {
 #[derive(Clone, Copy, Debug)]
 struct FieldId(usize);
 
-impl Table {
-    fn new<const N: usize>(states: usize, fields: [(&'static str, Vec<usize>); N]) -> (Self, [FieldId; N]) {
-        let fields = fields.map(|(name, shape)| {
-            let width: usize = shape.iter().product();
-            Field { name, shape, data: vec![f64::NAN; states * width] }
-        });
-        let table = Table { fields: fields.into(), status: vec![Status::Ok; states] };
-        (table, std::array::from_fn(FieldId))
-    }
-
-    /// Writes `values` as the `part`-th piece of that size in the state's row.
-    fn set(&mut self, field: FieldId, state: usize, part: usize, values: &[f64]) {
-        let field = &mut self.fields[field.0];
-        let width: usize = field.shape.iter().product();
-        let start = state * width + part * values.len();
-        field.data[start..start + values.len()].copy_from_slice(values);
-    }
-}
-
-/// Poses (16 numbers each, rows of the homogeneous matrix), twists and accelerations (6 each) of the states.
+/// Poses (16 numbers each, rows of the homogeneous matrix), twists and accelerations (6 each, or none at all where
+/// everything is at rest) of the states.
 #[derive(Clone, Copy, Debug)]
 pub struct States<'a> {
     pub poses: &'a [f64],
@@ -96,20 +81,32 @@ impl States<'_> {
         self.poses.is_empty()
     }
 
-    /// The state, and whether it is one that the mechanism can be in.
-    fn read(&self, mech: &Mechanism, i: usize) -> (Motion<f64>, Status) {
-        let (pose, status) = read_pose(mech, self.poses, i);
-        let twist = Twist::from_array(six(self.twists, i));
-        let acceleration = Acceleration::from_array(six(self.accelerations, i));
-        let status = then(status, || check_twist(mech, &pose, &twist));
-        let status = then(status, || check_acceleration(mech, &pose, &twist, &acceleration));
-        (Motion { pose, twist, acceleration }, status)
+    /// The states, and whether they are ones that the mechanism can be in.
+    #[inline(always)]
+    fn at<V: Lanes>(&self, mech: &Mechanism, at: At) -> (Motion<V>, Codes<V>) {
+        let (pose, codes) = any_pose(self.poses, at);
+        let twist = Twist::from_array(at.read_or_zero(self.twists));
+        let acceleration = Acceleration::from_array(at.read_or_zero(self.accelerations));
+        let platform = Motion { pose, twist, acceleration };
+        (platform, with_motion(mech, &platform, with_legs(mech, &pose, codes)))
     }
 
-    /// The same with the load at it.
-    fn read_loaded(&self, mech: &Mechanism, loads: &Loads, i: usize) -> (Motion<f64>, Wrench<f64>, Status) {
-        let (platform, status) = self.read(mech, i);
-        let load = loads.at(mech, &platform.pose, i);
-        (platform, load, then(status, || check_finite(&load.array())))
+    /// The same with the load at them.
+    #[inline(always)]
+    fn loaded_at<V: Lanes>(
+        &self,
+        mech: &Mechanism,
+        loads: &Loads,
+        at: At,
+    ) -> (Motion<V>, Wrench<V>, Codes<V>) {
+        let (platform, codes) = self.at(mech, at);
+        let load = loads.of(mech, &platform.pose, at);
+        (platform, load, codes.unless(finite(&load.array()), Status::InvalidInput))
+    }
+
+    /// A single state with the load at it.
+    fn one(&self, mech: &Mechanism, loads: &Loads, i: usize) -> (Motion<f64>, Wrench<f64>, Status) {
+        let (platform, load, codes) = self.loaded_at(mech, loads, At::one(i));
+        (platform, load, codes.status())
     }
 }
