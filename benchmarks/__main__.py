@@ -14,7 +14,8 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 from benchmarks import page, timing, workspace
-from polypod import _core
+from benchmarks.operations import Polypod
+from polypod import compute
 
 ROOT = Path(__file__).parent.parent
 RESULTS = Path(__file__).parent / "results.json"
@@ -26,9 +27,6 @@ MEASURED = 10**6
 """States of the batches whose memory is measured."""
 LIMIT = 60
 """s: a workspace that takes longer is not waited for."""
-
-# Else glibc raises the size from which it gives memory back with every large array that is freed.
-MEMORY = {"MALLOC_MMAP_THRESHOLD_": "65536"}
 
 
 def child(module, *arguments, timeout=600, **environment):
@@ -46,13 +44,13 @@ def child(module, *arguments, timeout=600, **environment):
 
 
 def operations(what, threads, sizes, **environment):
-    return child("operations", what, threads, *sizes, RAYON_NUM_THREADS=str(threads), **environment)
+    return child("operations", what, threads, *sizes, POLYPOD_THREADS=str(threads), **environment)
 
 
 def instruction_sets():
     """Times of the operations with each instruction set that the product can be told to use."""
     rows = []
-    for name in getattr(_core, "instruction_sets", list)():
+    for name in compute.instruction_sets():
         measured = operations("curve", 1, [COMPARED], POLYPOD_INSTRUCTIONS=name)
         rows += [row | {"instructions": name} for row in measured]
     return rows
@@ -62,7 +60,7 @@ def workspaces(threads):
     rows = []
     for name in workspace.RUNS:
         try:
-            rows += child("workspace", name, threads, timeout=LIMIT, RAYON_NUM_THREADS=str(threads))
+            rows += child("workspace", name, threads, timeout=LIMIT, POLYPOD_THREADS=str(threads))
         except subprocess.TimeoutExpired:
             rows.append({"what": name, "seconds": None, "peak": None})
     return rows
@@ -141,13 +139,14 @@ def measure():
     say("instruction sets")
     results["instruction_sets"] = instruction_sets()
     say("memory")
-    results["memory"] = operations("memory", threads[-1], [MEASURED], **MEMORY)
+    results["memory"] = [
+        row for task in Polypod.tasks for row in operations(f"memory {task}", threads[-1], [MEASURED])
+    ]
     say("workspaces")
     results["workspaces"] = workspaces(threads[-1])
     say("Rust")
     results["rust"] = rust()
     results["flops"] = json.loads(cargo("run", "--release", "--example", "flops"))
-    results["flops"] |= child("peak")
     return results
 
 

@@ -93,8 +93,8 @@ def comparison_table(results):
 
 
 def operations_table(results):
-    fused, unfused = (results["flops"][f"{kind}_flops_per_second"] for kind in ("fused", "unfused"))
-    peak, counts = max(fused, unfused), results["flops"]["per_state"]
+    fused, separate = (results["flops"][f"{kind}_flops_per_second"] for kind in ("fused", "separate"))
+    peak, counts = max(fused, separate), results["flops"]["per_state"]
     found = {(row["operation"], row["threads"], row["states"]): row for row in results["curves"]}
     rows = []
     for name, title in NAMES.items():
@@ -119,7 +119,7 @@ def operations_table(results):
     head = ("", "one state", f"of {COMPARED:,}", "quartiles", "two threads", "faster", "flops", "of the peak")
     peaks = (
         f"Peak of the core: {digits(fused / 1e9)} Gflop/s with fused multiplications and additions, "
-        f"{digits(unfused / 1e9)} Gflop/s with separate ones.\n\n"
+        f"{digits(separate / 1e9)} Gflop/s with separate ones.\n\n"
     )
     return table(head, rows) + peaks
 
