@@ -53,9 +53,8 @@ lint: $(BUILT) ## formatting, style and types of both languages
 	then echo "cargo clippy --target $(ARM)"; cargo clippy $(LOCKED) --target $(ARM) -p polypod-core -- -D warnings; \
 	else echo "registers of $(ARM): not compiled, rustup target add $(ARM)"; fi
 
-bench: $(BUILT) ## measure the speed from Rust and from Python
-	cargo bench $(LOCKED) -p polypod-core
-	@for file in benchmarks/*.py; do echo "$(BIN)/python $$file"; $(BIN)/python "$$file" || exit 1; done
+bench: $(BUILT) ## measure the speed, beside alternatives, and write docs/performance.md
+	$(BIN)/python -m benchmarks
 
 docs: $(BUILT) ## build the site into site/
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
@@ -65,7 +64,7 @@ wheel: $(DEPS) ## build a wheel for this machine into dist/
 
 lock: $(DEPS) ## renew requirements.lock and Cargo.lock
 	$(BIN)/uv pip compile --quiet --upgrade --universal --python-version 3.11 --generate-hashes --no-header \
-		--extra dev --output-file requirements.lock pyproject.toml
+		--extra dev --extra bench --output-file requirements.lock pyproject.toml
 	cargo update
 
 clean: ## remove whatever these targets made

@@ -1,19 +1,21 @@
 """Times and peak memory of workspaces: the paper's lattice of lengths, a million voxels, assembly modes.
 
-Each row runs in a process of its own, so that its peak memory is its own.
+Each runs in a process of its own, so that its peak memory is its own. Prints a line of JSON; run by
+`python -m benchmarks`.
 """
 
+import json
 import resource
-import subprocess
 import sys
 from time import perf_counter
 
 import numpy as np
 
 import polypod as pp
+from benchmarks import timing
+from benchmarks.states import NAME
 from polypod import _core
 
-NAME = "lu-3spu-2rpu-r"
 STEP = 0.0131
 COUNTS = (115, 115, 77)
 
@@ -21,7 +23,7 @@ COUNTS = (115, 115, 77)
 def lattice():
     """The paper's Section 4: steps of 10 mm, 21^5 combinations."""
     found = pp.load(NAME).length_lattice(step=0.01)
-    return {f"lattice of {found.nodes} lengths": None}
+    return {f"lattice of {found.nodes:,} lengths": None}
 
 
 def voxels():
@@ -35,15 +37,15 @@ def voxels():
     flooded = perf_counter() - start
     edges = len(flood.edges()["node"])
     return {
-        f"flood of {np.prod(COUNTS)} voxels": flooded,
-        f"its boundary: {edges} edges": perf_counter() - start - flooded,
+        f"flood of {np.prod(COUNTS):,} voxels": flooded,
+        f"its boundary, {edges:,} edges": perf_counter() - start - flooded,
     }
 
 
 def meshed():
     """The same from Python with mesh, volume and error."""
     found = pp.load(NAME).workspace(step=STEP)
-    return {f"workspace of {found.mask.size} voxels with mesh": None}
+    return {f"workspace of {found.mask.size:,} voxels with mesh": None}
 
 
 def modes():
@@ -60,22 +62,21 @@ def modes():
 RUNS = {"lattice": lattice, "voxels": voxels, "meshed": meshed, "modes": modes}
 
 
-def measure(name):
+def main(name, threads):
+    timing.pin(int(threads))
     start = perf_counter()
     rows = RUNS[name]()
     whole = perf_counter() - start
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024  # kB on Linux
-    for text, seconds in rows.items():
-        seconds = whole if seconds is None else seconds
-        time = f"{seconds:10.3f} s " if seconds >= 1.0 else f"{1e3 * seconds:10.3f} ms"
-        print(f"{text:48}{time}{peak:10.0f} MB")
-
-
-def main():
-    print(f"{'':48}{'time':>13}{'peak':>13}", flush=True)
-    for name in RUNS:
-        subprocess.run([sys.executable, __file__, name], check=True)
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024  # kB on Linux
+    print(
+        json.dumps(
+            [
+                {"what": text, "seconds": whole if seconds is None else seconds, "peak": peak}
+                for text, seconds in rows.items()
+            ]
+        )
+    )
 
 
 if __name__ == "__main__":
-    measure(sys.argv[1]) if len(sys.argv) > 1 else main()
+    main(*sys.argv[1:])

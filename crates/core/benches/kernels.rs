@@ -8,7 +8,7 @@ use std::hint::black_box;
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use polypod_core::real::{Dual, Real};
 use polypod_core::spatial::{Acceleration, Motion, Pose, Twist, Vec3, Wrench};
-use polypod_core::{dynamics, forward, jacobian, leg};
+use polypod_core::{dynamics, forward, forward_dynamics, jacobian, leg};
 
 /// Different states in turn, so that nothing is learnt from the last one.
 const STATES: usize = 64;
@@ -46,6 +46,10 @@ fn kernels(criterion: &mut Criterion) {
     });
     measure("inverse dynamics", &|s| {
         black_box(dynamics::inverse_dynamics(&mech, s, mech.load.wrench));
+    });
+    measure("forward dynamics", &|s| {
+        let forces = black_box([100.0; 5]);
+        black_box(forward_dynamics::forward_dynamics(&mech, &s.pose, &s.twist, &forces, mech.load.wrench));
     });
     measure("forward kinematics from a guess 1 mm off", &|s| {
         let mut lengths: Vec<f64> = mech.legs.iter().map(|leg| leg::position(leg, &s.pose).length).collect();

@@ -1,0 +1,215 @@
+"""The page docs/performance.md: tables and the figure from results, where its text leaves room for them."""
+
+import re
+
+import matplotlib.pyplot as plt
+
+from polypod.style import DASHES, GREY, INK, PALETTE, house_style
+
+COMPARED = 100_000
+NAMES = {
+    "inverse_dynamics": "inverse dynamics",
+    "inverse_dynamics_from_coordinates": "inverse dynamics from coordinates",
+    "inverse_kinematics": "inverse kinematics",
+    "jacobian": "Jacobian",
+    "kinematics": "kinematics of all links",
+    "forward_kinematics": "forward kinematics, near guess",
+    "forward_dynamics": "forward dynamics",
+    "limits": "all limits",
+}
+
+
+def write(results, docs):
+    """Fills the page between `<!-- measured: name -->` and `<!-- end -->`, and draws the figure."""
+    path = docs / "performance.md"
+    path.write_text(filled(path.read_text(encoding="utf-8"), results), encoding="utf-8")
+    draw(results, docs / "images" / "performance.svg")
+
+
+def filled(text, results):
+    """The text of the page with the tables of these results."""
+
+    def place(found):
+        table = TABLES[found[1]](results)
+        return f"<!-- measured: {found[1]} -->\n{table}<!-- end -->"
+
+    return re.sub(r"<!-- measured: ([a-z ]+) -->\n.*?<!-- end -->", place, text, flags=re.DOTALL)
+
+
+def table(head, rows):
+    lines = [head, ["---"] * len(head), *rows]
+    return "\n" + "".join(f"| {' | '.join(map(str, line))} |\n" for line in lines) + "\n"
+
+
+def time(nanoseconds):
+    """With three digits and a unit."""
+    for unit, size in (("s", 1e9), ("ms", 1e6), ("µs", 1e3)):
+        if nanoseconds >= 0.9995 * size:
+            return f"{digits(nanoseconds / size)} {unit}"
+    return f"{digits(nanoseconds)} ns"
+
+
+def digits(number, count=3):
+    """Rounded to so many digits, without an exponent."""
+    whole = f"{number:.{count}g}"
+    return f"{float(whole):,.0f}" if "e" in whole or float(whole) >= 10 ** (count - 1) else whole
+
+
+def spread(row):
+    return f"{time(row['low'])} to {time(row['high'])}"
+
+
+def megabytes(size):
+    return f"{digits(size / 2**20)} MiB"
+
+
+def machine_table(results):
+    m = results["machine"]
+    packages = ", ".join(f"{name} {v}" for name, v in m["packages"].items() if v)
+    rows = [
+        ("processor", f"{m['processor']}, {m['cores']} cores, cache {m['cache']}, {m['architecture']}"),
+        ("instructions", ", ".join(m["instructions"])),
+        ("memory", f"{m['memory'] / 2**30:.0f} GiB"),
+        ("system", f"{m['system']}; Python {m['python']}; {m['rust']}"),
+        ("packages", packages),
+        ("measured", f"{m['date']}, load at the start {m['load']:.1f}"),
+    ]
+    return table(("", ""), rows)
+
+
+def comparison_table(results):
+    rows, last = [], None
+    for row in results["comparison"]:
+        task = NAMES.get(row["task"], "") if row["task"] != last else ""
+        last = row["task"]
+        if "refused" in row:
+            rows.append((task, row["name"], f"not timed: {row['refused']}", "", "", "", ""))
+            continue
+        same = f"{row['difference']:.0e} of {row['tolerance']:.0e}" if "difference" in row else ""
+        name = row["name"] + (f", {row['note']}" if "note" in row else "")
+        ratio = digits(row["ratio"], 2) if row["name"] != "Polypod" else "1"
+        rows.append((task, name, time(row["median"]), spread(row), ratio, f"{row['states']:,}", same))
+    return table(("", "", "per state", "quartiles", "ratio", "states", "difference, tolerance"), rows)
+
+
+def operations_table(results):
+    fused, separate = (results["flops"][f"{kind}_flops_per_second"] for kind in ("fused", "separate"))
+    peak, counts = max(fused, separate), results["flops"]["per_state"]
+    found = {(row["operation"], row["threads"], row["states"]): row for row in results["curves"]}
+    rows = []
+    for name, title in NAMES.items():
+        single, one, two = (found.get((name, *key)) for key in ((1, 1), (1, COMPARED), (2, COMPARED)))
+        if one is None:
+            continue
+        flops = counts.get(name, {}).get("flops")
+        # A Newton step is no state: its flops say nothing about the time of an iteration of several.
+        known = flops is not None and name != "forward_kinematics"
+        rows.append(
+            (
+                title,
+                time(single["median"]),
+                time(one["median"]),
+                spread(one),
+                time(two["median"]) if two else "",
+                digits(one["median"] / two["median"], 2) if two else "",
+                f"{flops:,}" if flops else "",
+                f"{1e9 * flops / one['median'] / peak:.1%}" if known else "",
+            )
+        )
+    head = ("", "one state", f"of {COMPARED:,}", "quartiles", "two threads", "faster", "flops", "of the peak")
+    peaks = (
+        f"Peak of the core: {digits(fused / 1e9)} Gflop/s with fused multiplications and additions, "
+        f"{digits(separate / 1e9)} Gflop/s with separate ones.\n\n"
+    )
+    return table(head, rows) + peaks
+
+
+def instruction_sets_table(results):
+    found = {(row["operation"], row["instructions"]): row for row in results["instruction_sets"]}
+    sets = list(dict.fromkeys(name for _, name in found))
+    if not sets:
+        return ""
+    rows = [
+        (title, *(time(found[task, name]["median"]) for name in sets))
+        for task, title in NAMES.items()
+        if (task, sets[0]) in found
+    ]
+    return table((f"per state of {COMPARED:,}", *sets), rows)
+
+
+def rust_table(results):
+    rows = [(row["operation"], time(row["median"]), spread(row)) for row in results["rust"]]
+    return table(("", "one state", "quartiles"), rows)
+
+
+def memory_table(results):
+    rows = [
+        (
+            NAMES[row["operation"]],
+            f"{row['states']:,}",
+            megabytes(row["peak"]),
+            megabytes(row["output"]),
+            megabytes(max(row["peak"] - row["output"], 0)),
+        )
+        for row in results["memory"]
+    ]
+    return table(("", "states", "peak", "of it output", "the rest"), rows)
+
+
+def workspaces_table(results):
+    rows = [
+        (
+            row["what"],
+            time(1e9 * row["seconds"]) if row["seconds"] else "not waited for",
+            megabytes(row["peak"]) if row["peak"] else "",
+        )
+        for row in results["workspaces"]
+    ]
+    return table(("", "time", "peak of the process"), rows)
+
+
+TABLES = {
+    "machine": machine_table,
+    "comparison": comparison_table,
+    "operations": operations_table,
+    "instruction sets": instruction_sets_table,
+    "rust": rust_table,
+    "memory": memory_table,
+    "workspaces": workspaces_table,
+}
+
+
+def draw(results, path):
+    """Time per state over the number of states, with other ways to inverse dynamics as points."""
+    with house_style():
+        figure, axes = plt.subplots(figsize=(7.0, 3.9), layout="constrained")
+        for (name, title), color in zip(NAMES.items(), (*PALETTE, GREY), strict=True):
+            for threads, dash in ((1, "-"), (2, DASHES[2])):
+                curve = [r for r in results["curves"] if (r["operation"], r["threads"]) == (name, threads)]
+                if not curve:
+                    continue
+                x, y = [r["states"] for r in curve], [r["median"] for r in curve]
+                axes.plot(x, y, color=color, ls=dash, label=title if threads == 1 else None)
+                axes.fill_between(
+                    x,
+                    [r["low"] for r in curve],
+                    [r["high"] for r in curve],
+                    color=color,
+                    alpha=0.15,
+                    lw=0,
+                )
+        for row in results["comparison"]:
+            if row["task"] == "inverse_dynamics" and row["name"] != "Polypod" and "median" in row:
+                axes.plot(row["states"], row["median"], "o", color=INK, ms=3.5)
+                axes.annotate(
+                    row["name"],
+                    (row["states"], row["median"]),
+                    (5, 3),
+                    textcoords="offset points",
+                    fontsize=7,
+                )
+        axes.set(xscale="log", yscale="log", xlabel="states in a call", ylabel="time per state / ns")
+        axes.set_title("Dotted: two threads. Points: other ways to inverse dynamics.")
+        figure.legend(loc="outside right center")
+        figure.savefig(path, metadata={"Date": None})
+        plt.close(figure)
