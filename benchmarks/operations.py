@@ -98,7 +98,7 @@ def _size(given):
 
 
 def memory(task, given):
-    """Bytes at the peak of the first large call beside its input, and those of its output; None if unknown."""
+    """Bytes at the peak of the first large call beside its input, and those of its output; None: unknown."""
     getattr(Polypod(given.sized(100)), task)()  # what is made once
     call = getattr(Polypod(given), task)
     status, reset = Path("/proc/self/status"), Path("/proc/self/clear_refs")
