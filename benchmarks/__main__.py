@@ -146,6 +146,7 @@ def measure():
     results["workspaces"] = workspaces(threads[-1])
     say("Rust")
     results["rust"] = rust()
+    results["bandwidth"] = child("bandwidth")
     results["flops"] = json.loads(cargo("run", "--release", "--example", "flops"))
     return results
 

@@ -21,21 +21,25 @@ MEMORY = 0.5
 """Part of the machine's memory that a batch of states and its output may take."""
 
 
+INPUTS = {
+    "inverse_kinematics": ("pose",),
+    "jacobian": ("pose",),
+    "kinematics": ("pose", "twist", "acceleration"),
+    "inverse_dynamics": ("pose", "twist", "acceleration"),
+    "inverse_dynamics_from_coordinates": ("coordinates", "rates", "second_rates"),
+    "forward_kinematics": ("lengths", "guess"),
+    "forward_dynamics": ("pose", "twist", "forces"),
+    "limits": ("pose",),
+}
+"""The arrays of the states that each operation reads."""
+
+
 class Polypod:
     """The operations at given states, each with all its checks and its status."""
 
     version = pp.__version__
     count = 100_000
-    tasks = (
-        "inverse_kinematics",
-        "jacobian",
-        "kinematics",
-        "inverse_dynamics",
-        "inverse_dynamics_from_coordinates",
-        "forward_kinematics",
-        "forward_dynamics",
-        "limits",
-    )
+    tasks = tuple(INPUTS)
 
     def __init__(self, states):
         self.mech, self.states = states.mech, states
@@ -73,6 +77,9 @@ class Polypod:
 def curve(task, given, sizes):
     """Times of batches of growing size, the first a call for a single state."""
     rows, last = [], 0.0
+    few = given.sized(100)
+    arrays = [*(getattr(few, name) for name in INPUTS[task]), *getattr(Polypod(few), task)()]
+    moved = sum(map(_size, arrays)) / 100
     available = MEMORY * os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
     for size in sizes:
         too_much = size * last > LONGEST * 1e9 or size * _bytes_per_state(task, given) > available
@@ -80,7 +87,7 @@ def curve(task, given, sizes):
             break
         call = getattr(Polypod(given.single() if size == 1 else given.sized(size)), task)
         times = timing.rounds({task: call}, {task: size})[task]
-        rows.append({"operation": task, "states": size, **timing.summary(times)})
+        rows.append({"operation": task, "states": size, "bytes": moved, **timing.summary(times)})
         last = rows[-1]["median"]
     return rows
 

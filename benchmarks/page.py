@@ -95,6 +95,7 @@ def comparison_table(results):
 def operations_table(results):
     fused, separate = (results["flops"][f"{kind}_flops_per_second"] for kind in ("fused", "separate"))
     peak, counts = max(fused, separate), results["flops"]["per_state"]
+    moved = results["bandwidth"]["bytes_per_second"]
     found = {(row["operation"], row["threads"], row["states"]): row for row in results["curves"]}
     rows = []
     for name, title in NAMES.items():
@@ -114,12 +115,18 @@ def operations_table(results):
                 digits(one["median"] / two["median"], 2) if two else "",
                 f"{flops:,}" if flops else "",
                 f"{1e9 * flops / one['median'] / peak:.1%}" if known else "",
+                f"{one['bytes']:,.0f}",
+                time(1e9 * one["bytes"] / moved),
             )
         )
-    head = ("", "one state", f"of {COMPARED:,}", "quartiles", "two threads", "faster", "flops", "of the peak")
+    head = (
+        *("", "one state", f"of {COMPARED:,}", "quartiles", "two threads", "faster"),
+        *("flops", "of the peak", "bytes", "to copy them"),
+    )
     peaks = (
         f"Peak of the core: {digits(fused / 1e9)} Gflop/s with fused multiplications and additions, "
-        f"{digits(separate / 1e9)} Gflop/s with separate ones.\n\n"
+        f"{digits(separate / 1e9)} Gflop/s with separate ones. It copies {digits(moved / 1e9)} GB/s, "
+        "read and written.\n\n"
     )
     return table(head, rows) + peaks
 

@@ -13,7 +13,7 @@ import numpy as np
 
 import polypod as pp
 from benchmarks import timing
-from benchmarks.states import NAME
+from benchmarks.states import NAME, states
 from polypod import _core
 
 STEP = 0.0131
@@ -48,6 +48,17 @@ def meshed():
     return {f"workspace of {found.mask.size:,} voxels with mesh": None}
 
 
+def scan():
+    """All limits of a million poses, once warm."""
+    poses = states().sized(10**6).pose
+    mech, times = pp.load(NAME), []
+    for _ in range(5):
+        start = perf_counter()
+        mech.limits(poses)
+        times.append(perf_counter() - start)
+    return {f"limits of {len(poses):,} poses": float(np.median(times))}
+
+
 def modes():
     """Assembly modes for some sets of lengths."""
     mech = pp.load(NAME)
@@ -59,7 +70,7 @@ def modes():
     return {"assembly modes, one set of lengths": (perf_counter() - start) / len(lengths)}
 
 
-RUNS = {"lattice": lattice, "voxels": voxels, "meshed": meshed, "modes": modes}
+RUNS = {"scan": scan, "lattice": lattice, "voxels": voxels, "meshed": meshed, "modes": modes}
 
 
 def main(name, threads):

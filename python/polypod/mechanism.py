@@ -1171,7 +1171,7 @@ class Mechanism:
         shape = shapes[0]
         # Plain calls, those of a controller, do without numpy's slow broadcasting.
         if shapes.count(shape) == len(shapes):
-            return shape, [np.ascontiguousarray(array) for array in arrays]
+            return shape, [a if a.flags.c_contiguous else np.ascontiguousarray(a) for a in arrays]
         shape = _broadcast(*shapes)
         return shape, [
             _spread(a, shape, core) for a, (_, core) in zip(arrays, arguments.values(), strict=True)
@@ -1213,7 +1213,7 @@ def _number(name: str, value: ArrayLike) -> Array:
 def _array(name: str, value: ArrayLike, core: tuple[int, ...]) -> Array:
     """`value` as doubles whose last axes are `core`."""
     try:
-        array = np.asarray(value, dtype=np.float64)
+        array = np.asarray(value, np.float64)
     except (TypeError, ValueError) as error:
         raise ShapeError(f"{name} is not an array of numbers: {error}") from None
     if array.shape[array.ndim - len(core) :] != core:

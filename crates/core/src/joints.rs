@@ -80,9 +80,7 @@ pub fn angles_at<T: Trig>(
     };
     let none = T::lit(f64::NAN);
     let angles = match (joint.kind, joint.axis) {
-        (JointKind::Universal, Some(u)) => {
-            [about(u, n0, n), wrapped(swing(u, delta, n) - T::lit(swing(u, delta0, n0)))]
-        }
+        (JointKind::Universal, Some(u)) => [about(u, n0, n), swing(u, (delta0, n0), delta, n)],
         (JointKind::Revolute, Some(u)) => [about(u, delta0, delta), none],
         _ => [none, none],
     };
@@ -121,11 +119,20 @@ fn about<T: Trig>(axis: Vec3<f64>, from: Vec3<f64>, to: Vec3<T>) -> T {
     to.dot(side).atan2(along)
 }
 
-/// The angle of a leg about its normal, from the axis of its universal joint.
+/// The turn of a leg about its normal since it had the given direction and normal, from where it is to the axis of its
+/// universal joint then and now.
 #[inline(always)]
-fn swing<T: Trig>(axis: Vec3<f64>, delta: Vec3<T>, n: Vec3<T>) -> T {
-    let axis = Vec3::lift(axis);
-    delta.dot(n.cross(axis)).atan2(delta.dot(axis))
+fn swing<T: Trig>(axis: Vec3<f64>, zero: (Vec3<f64>, Vec3<f64>), delta: Vec3<T>, n: Vec3<T>) -> T {
+    let (y0, x0) = across(axis, zero.0, zero.1);
+    let (y, x) = across(Vec3::lift(axis), delta, n);
+    let (y0, x0) = (T::lit(y0), T::lit(x0));
+    (y * x0 - x * y0).atan2(x * x0 + y * y0)
+}
+
+/// The leg's direction across the axis and along it, in the plane square to the normal.
+#[inline(always)]
+fn across<T: Real>(axis: Vec3<T>, delta: Vec3<T>, n: Vec3<T>) -> (T, T) {
+    (delta.dot(n.cross(axis)), delta.dot(axis))
 }
 
 /// The angle of the same direction within a half turn of zero.

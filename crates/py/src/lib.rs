@@ -9,7 +9,7 @@ mod workspace;
 
 use std::sync::OnceLock;
 
-use numpy::{PyArray1, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
+use numpy::{PyArray1, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use polypod_core::assembly::assemble;
 use polypod_core::batch::{self, Coordinates, Loads, Space, States, Table};
 use polypod_core::coordinates::Set;
@@ -64,13 +64,23 @@ fn expect(array: &[f64], width: usize, poses: &[f64]) -> PyResult<()> {
     Ok(())
 }
 
+/// Numbers that are sooner copied than handed over.
+const SMALL: usize = 1024;
+
 /// Arrays by name, the states along the first axis, and their status.
 fn arrays(py: Python<'_>, table: Table) -> PyResult<Bound<'_, PyDict>> {
     let result = PyDict::new(py);
     let states = table.status.len();
     for field in table.fields {
         let shape: Vec<usize> = std::iter::once(states).chain(field.shape).collect();
-        result.set_item(field.name, PyArray1::from_vec(py, field.data).reshape(shape)?)?;
+        if field.data.len() <= SMALL {
+            let array = PyArrayDyn::<f64>::zeros(py, shape, false);
+            // SAFETY: nobody else has it yet.
+            unsafe { array.as_slice_mut()? }.copy_from_slice(&field.data);
+            result.set_item(field.name, array)?;
+        } else {
+            result.set_item(field.name, PyArray1::from_vec(py, field.data).reshape(shape)?)?;
+        }
     }
     let status: Vec<u8> = table.status.iter().map(|&s| s as u8).collect();
     result.set_item("status", PyArray1::from_vec(py, status))?;
