@@ -190,8 +190,7 @@ class Mechanism:
     @property
     def coupled_legs(self) -> tuple[str, str] | None:
         """The two legs on one rod that share a constraint, or None: those of `coupled_forces`."""
-        empty = np.empty(0)
-        result = self._core.coupled_forces(empty, empty, False)
+        result = self._core.coupled_forces(np.empty((0, 4, 4)), np.empty(0), False)
         return None if result is None else (self.leg_names[result[0][0]], self.leg_names[result[0][1]])
 
     @property
@@ -1236,10 +1235,8 @@ def _spread(array: Array, shape: tuple[int, ...], core: tuple[int, ...]) -> Arra
 
 def _shaped(table: Mapping[str, NDArray[Any]], shape: tuple[int, ...]) -> dict[str, NDArray[Any]]:
     """The core's arrays with the batch's own leading axes."""
-    if len(shape) == 1:
+    if table["status"].shape == shape:
         return dict(table)
-    if not shape:
-        return {name: array[0, ...] for name, array in table.items()}
     return {name: array.reshape(shape + array.shape[1:]) for name, array in table.items()}
 
 

@@ -444,7 +444,6 @@ mod tests {
     use crate::common::published;
     use crate::coordinates::Set;
     use crate::forward::{continuation, size, step_of, system};
-    use crate::lanes;
     use crate::limits::Limit;
     use crate::linear::solve;
     use crate::mechanism::Side;
@@ -509,8 +508,30 @@ mod tests {
         met
     }
 
+    /// What is met on each way, of those that are followed together.
+    fn followed(mech: &Mechanism, ways: &[Way]) -> Vec<Vec<Met>> {
+        let mut met = vec![vec![]; ways.len()];
+        let room = Room { mech, bounds: &BOUNDS };
+        let numbered = ways.iter().cloned().enumerate().map(|(step, mut way)| {
+            way.step = step;
+            way
+        });
+        follow(room, numbered, |i, one| met[i].push(one));
+        met
+    }
+
+    /// The same, but for the rounding of registers that fuse.
+    fn near(a: &Met, b: &Met) -> bool {
+        match (a, b) {
+            (Met::Place(a), Met::Place(b)) => (*a - *b).norm() < 1e-9,
+            (Met::Pose(a), Met::Pose(b)) => (a.o - b.o).norm() < 1e-9,
+            (Met::Limit, Met::Limit) | (Met::Singularity, Met::Singularity) => true,
+            _ => false,
+        }
+    }
+
     #[test]
-    fn ways_side_by_side_are_those_alone_bit_by_bit() {
+    fn ways_side_by_side_are_those_alone() {
         let (mut limits, mut singularities, mut poses) = (0, 0, 0);
         for mech in mechanisms() {
             let mut lattice = lattice(&mech, 0.05);
@@ -518,26 +539,24 @@ mod tests {
                 lattice.wave(&mech);
             }
             let ways = ways(&mech, &lattice);
-            println!("{} ways", ways.len());
             assert!(ways.len() > 200);
-            let each: Vec<String> =
-                ways.iter().map(|(_, pose, ends)| format!("{:?}", alone(&mech, pose, ends))).collect();
-            for set in lanes::instruction_sets() {
-                lanes::use_instructions(set);
-                let mut met = vec![vec![]; ways.len()];
-                let room = Room { mech: &mech, bounds: &BOUNDS };
-                follow(room, ways.iter().map(|(way, ..)| way.clone()), |i, one| {
+            let each: Vec<Way> = ways.iter().map(|(way, ..)| way.clone()).collect();
+            for (met, (way, pose, ends)) in followed(&mech, &each).iter().zip(&ways) {
+                let [by_itself] = &followed(&mech, std::slice::from_ref(way))[..] else { panic!("one way") };
+                assert_eq!(format!("{met:?}"), format!("{by_itself:?}"));
+                let plain = alone(&mech, pose, ends);
+                assert!(
+                    met.len() == plain.len() && met.iter().zip(&plain).all(|(a, b)| near(a, b)),
+                    "{met:?} {plain:?}"
+                );
+                for one in met {
                     limits += u32::from(matches!(one, Met::Limit));
                     singularities += u32::from(matches!(one, Met::Singularity));
                     poses += u32::from(matches!(one, Met::Pose(_)));
-                    met[i].push(one);
-                });
-                for (met, alone) in met.iter().zip(&each) {
-                    assert_eq!(format!("{met:?}"), *alone, "{set}");
                 }
             }
         }
-        assert!(limits > 100 && singularities > 100 && poses > 1000, "{limits} {singularities} {poses}");
+        assert!(limits > 30 && singularities > 30 && poses > 300, "{limits} {singularities} {poses}");
     }
 
     #[test]

@@ -5,7 +5,6 @@ mod common;
 use common::{published, with_leg};
 use polypod_core::constraint::largest_distance;
 use polypod_core::coordinates::Set;
-use polypod_core::lanes;
 use polypod_core::lattice::Lattice;
 use polypod_core::leg;
 use polypod_core::mechanism::Mechanism;
@@ -107,22 +106,6 @@ fn nothing_depends_on_the_number_of_threads() {
         })
     };
     assert!(run(1) == run(2));
-}
-
-#[test]
-fn nothing_depends_on_the_instructions() {
-    let mech = published();
-    let sets = lanes::instruction_sets();
-    let runs: Vec<_> = sets
-        .iter()
-        .map(|set| {
-            lanes::use_instructions(set);
-            let mut lattice = Lattice::new(&mech, &tilted(&mech), ABOVE, 0.05, 0.01).expect("a start");
-            while lattice.wave(&mech) > 0 {}
-            format!("{:?}", lattice.reached)
-        })
-        .collect();
-    assert!(runs.iter().all(|run| *run == runs[0]), "{sets:?}");
 }
 
 /// Largest and least coordinates of the boundary.

@@ -6,7 +6,7 @@ use polypod_core::{geometry, inertial};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use crate::{Array, PyMechanism, arrays, loads, states};
+use crate::{Array, PyMechanism, arrays, batch_of, loads, states};
 
 /// Names of the coordinates that are varied, and the arrays.
 #[pyfunction]
@@ -29,7 +29,7 @@ pub fn inverse_dynamics_derivatives<'py>(
     let given = batch::searched_coordinates(core, &set, names.as_deref());
     let varied = set.names().iter().zip(&given).filter(|(_, g)| **g).map(|(name, _)| *name).collect();
     let table = py.detach(|| batch::inverse_dynamics_derivatives(core, &states, &loads, &set, &given));
-    Ok((varied, arrays(py, table)?))
+    Ok((varied, arrays(py, table, &batch_of(&poses, 2))?))
 }
 
 #[pyfunction]

@@ -67,12 +67,17 @@ fn expect(array: &[f64], width: usize, poses: &[f64]) -> PyResult<()> {
 /// Numbers that are sooner copied than handed over.
 const SMALL: usize = 1024;
 
-/// Arrays by name, the states along the first axis, and their status.
-fn arrays(py: Python<'_>, table: Table) -> PyResult<Bound<'_, PyDict>> {
+/// Leading axes of an array whose states have so many axes themselves: those of its batch.
+fn batch_of(array: &Array<'_>, axes: usize) -> Vec<usize> {
+    let shape = array.shape();
+    shape[..shape.len().saturating_sub(axes)].to_vec()
+}
+
+/// Arrays by name and their status, with the axes of the batch before those of a state.
+fn arrays<'py>(py: Python<'py>, table: Table, batch: &[usize]) -> PyResult<Bound<'py, PyDict>> {
     let result = PyDict::new(py);
-    let states = table.status.len();
     for field in table.fields {
-        let shape: Vec<usize> = std::iter::once(states).chain(field.shape).collect();
+        let shape = [batch, &field.shape].concat();
         if field.data.len() <= SMALL {
             let array = PyArrayDyn::<f64>::zeros(py, shape, false);
             // SAFETY: nobody else has it yet.
@@ -83,7 +88,7 @@ fn arrays(py: Python<'_>, table: Table) -> PyResult<Bound<'_, PyDict>> {
         }
     }
     let status: Vec<u8> = table.status.iter().map(|&s| s as u8).collect();
-    result.set_item("status", PyArray1::from_vec(py, status))?;
+    result.set_item("status", PyArray1::from_vec(py, status).reshape(batch.to_vec())?)?;
     Ok(result)
 }
 
@@ -109,7 +114,7 @@ impl PyMechanism {
         let states = states(poses, twists, accelerations)?;
         let loads = loads(wrenches, platform_axes, states.poses)?;
         let table = py.detach(|| operation(&self.0, &states, &loads));
-        arrays(py, table)
+        arrays(py, table, &batch_of(poses, 2))
     }
 
     fn core(&self) -> &Mechanism {
@@ -220,7 +225,7 @@ impl PyMechanism {
         }
         let input = Coordinates { set, given: series, branch, guess, continued };
         let table = py.detach(|| batch::states(&self.0, &input, count));
-        arrays(py, table)
+        arrays(py, table, &[count])
     }
 
     fn coordinates<'py>(
@@ -229,27 +234,31 @@ impl PyMechanism {
         set: &str,
         poses: Array<'py>,
     ) -> PyResult<Bound<'py, PyDict>> {
+        let batch = batch_of(&poses, 2);
         let (set, poses) = (self.set(set)?, slice(&poses)?);
         let table = py.detach(|| batch::coordinate_values(&self.0, &set, poses));
-        arrays(py, table)
+        arrays(py, table, &batch)
     }
 
     fn inverse_kinematics<'py>(&self, py: Python<'py>, poses: Array<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let batch = batch_of(&poses, 2);
         let poses = slice(&poses)?;
         let table = py.detach(|| batch::inverse_kinematics(&self.0, poses));
-        arrays(py, table)
+        arrays(py, table, &batch)
     }
 
     fn jacobian<'py>(&self, py: Python<'py>, poses: Array<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let batch = batch_of(&poses, 2);
         let poses = slice(&poses)?;
         let table = py.detach(|| batch::jacobians(&self.0, poses));
-        arrays(py, table)
+        arrays(py, table, &batch)
     }
 
     fn hessian<'py>(&self, py: Python<'py>, poses: Array<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let batch = batch_of(&poses, 2);
         let poses = slice(&poses)?;
         let table = py.detach(|| batch::hessians(&self.0, poses));
-        arrays(py, table)
+        arrays(py, table, &batch)
     }
 
     fn conditioning<'py>(
@@ -258,9 +267,10 @@ impl PyMechanism {
         poses: Array<'py>,
         length: f64,
     ) -> PyResult<Bound<'py, PyDict>> {
+        let batch = batch_of(&poses, 2);
         let poses = slice(&poses)?;
         let table = py.detach(|| batch::conditioning(&self.0, poses, length));
-        arrays(py, table)
+        arrays(py, table, &batch)
     }
 
     fn determinant<'py>(
@@ -270,10 +280,11 @@ impl PyMechanism {
         twists: Array<'py>,
         length: f64,
     ) -> PyResult<Bound<'py, PyDict>> {
+        let batch = batch_of(&poses, 2);
         let (poses, twists) = (slice(&poses)?, slice(&twists)?);
         expect(twists, 6, poses)?;
         let table = py.detach(|| batch::determinants(&self.0, poses, twists, length));
-        arrays(py, table)
+        arrays(py, table, &batch)
     }
 
     fn singularity<'py>(
@@ -283,9 +294,10 @@ impl PyMechanism {
         length: f64,
         tolerance: f64,
     ) -> PyResult<Bound<'py, PyDict>> {
+        let batch = batch_of(&poses, 2);
         let poses = slice(&poses)?;
         let table = py.detach(|| batch::singularities(&self.0, poses, length, tolerance));
-        arrays(py, table)
+        arrays(py, table, &batch)
     }
 
     /// Names of the coordinates that are searched, and their arrays.
@@ -299,12 +311,13 @@ impl PyMechanism {
         length: f64,
         reach: f64,
     ) -> PyResult<(Vec<&'static str>, Bound<'py, PyDict>)> {
+        let batch = batch_of(&poses, 2);
         let (set, poses) = (self.set(set)?, slice(&poses)?);
         let given = batch::searched_coordinates(&self.0, &set, names.as_deref());
         let searched = set.names().iter().zip(&given).filter(|(_, g)| **g).map(|(name, _)| *name).collect();
         let search = Search { set, given, reach, scale: length };
         let table = py.detach(|| batch::nearest_singular(&self.0, poses, &search));
-        Ok((searched, arrays(py, table)?))
+        Ok((searched, arrays(py, table, &batch)?))
     }
 
     fn kinematics<'py>(
@@ -314,9 +327,10 @@ impl PyMechanism {
         twists: Array<'py>,
         accelerations: Array<'py>,
     ) -> PyResult<Bound<'py, PyDict>> {
+        let batch = batch_of(&poses, 2);
         let states = states(&poses, &twists, &accelerations)?;
         let table = py.detach(|| batch::kinematics(&self.0, &states));
-        arrays(py, table)
+        arrays(py, table, &batch)
     }
 
     #[pyo3(signature = (poses, twists, accelerations, wrenches, platform_axes))]
@@ -343,12 +357,13 @@ impl PyMechanism {
         wrenches: Option<Array<'py>>,
         platform_axes: bool,
     ) -> PyResult<Bound<'py, PyDict>> {
+        let batch = batch_of(&poses, 2);
         let (poses, twists, forces) = (slice(&poses)?, slice(&twists)?, slice(&forces)?);
         expect(twists, 6, poses)?;
         expect(forces, self.0.legs.len(), poses)?;
         let loads = loads(wrenches.as_ref(), platform_axes, poses)?;
         let table = py.detach(|| batch::forward_dynamics(&self.0, poses, twists, forces, &loads));
-        arrays(py, table)
+        arrays(py, table, &batch)
     }
 
     /// In platform space, or in coordinates of a set: their names, those of the set that are given, and the arrays.
@@ -361,6 +376,7 @@ impl PyMechanism {
         set: Option<&str>,
         names: Option<Vec<String>>,
     ) -> PyResult<(Vec<&'static str>, Bound<'py, PyDict>)> {
+        let batch = batch_of(&poses, 2);
         let (poses, twists) = (slice(&poses)?, slice(&twists)?);
         expect(twists, 6, poses)?;
         let (space, names) = match set {
@@ -373,7 +389,7 @@ impl PyMechanism {
             }
         };
         let table = py.detach(|| batch::equations_of_motion(&self.0, poses, twists, &space));
-        Ok((names, arrays(py, table)?))
+        Ok((names, arrays(py, table, &batch)?))
     }
 
     #[pyo3(signature = (poses, twists, accelerations, wrenches, platform_axes))]
@@ -416,10 +432,11 @@ impl PyMechanism {
         platform_axes: bool,
         length: f64,
     ) -> PyResult<Bound<'py, PyDict>> {
+        let batch = batch_of(&poses, 2);
         let states = states(&poses, &twists, &accelerations)?;
         let loads = loads(wrenches.as_ref(), platform_axes, states.poses)?;
         let table = py.detach(|| batch::joint_reactions(&self.0, &states, &loads, length));
-        arrays(py, table)
+        arrays(py, table, &batch)
     }
 
     /// Name, kind and links (towards the base, away from it) of each joint.
@@ -443,10 +460,11 @@ impl PyMechanism {
         poses: Array<'py>,
         rates: Array<'py>,
     ) -> PyResult<Bound<'py, PyDict>> {
+        let batch = batch_of(&poses, 2);
         let (poses, rates) = (slice(&poses)?, slice(&rates)?);
         expect(rates, self.0.legs.len(), poses)?;
         let table = py.detach(|| batch::platform_twist(&self.0, poses, rates));
-        arrays(py, table)
+        arrays(py, table, &batch)
     }
 
     fn platform_acceleration<'py>(
@@ -456,11 +474,12 @@ impl PyMechanism {
         twists: Array<'py>,
         accelerations: Array<'py>,
     ) -> PyResult<Bound<'py, PyDict>> {
+        let batch = batch_of(&poses, 2);
         let (poses, twists, accelerations) = (slice(&poses)?, slice(&twists)?, slice(&accelerations)?);
         expect(twists, 6, poses)?;
         expect(accelerations, self.0.legs.len(), poses)?;
         let table = py.detach(|| batch::platform_acceleration(&self.0, poses, twists, accelerations));
-        arrays(py, table)
+        arrays(py, table, &batch)
     }
 
     #[pyo3(signature = (lengths, guess, continued))]
@@ -471,13 +490,14 @@ impl PyMechanism {
         guess: Option<Array<'py>>,
         continued: bool,
     ) -> PyResult<Bound<'py, PyDict>> {
+        let batch = batch_of(&lengths, 1);
         let (lengths, guess) = (self.lengths(&lengths)?, guess.as_ref().map(slice).transpose()?);
         let count = lengths.len() / self.0.legs.len();
         if guess.is_some_and(|g| g.len() != 16 && g.len() != 16 * count) {
             return Err(PyValueError::new_err("needs one guess, or one for each state"));
         }
         let table = py.detach(|| batch::forward_kinematics(&self.0, lengths, guess, continued));
-        arrays(py, table)
+        arrays(py, table, &batch)
     }
 
     /// All modes one after the other, how many belong to each set of lengths, and the status of each set; none where
@@ -490,7 +510,8 @@ impl PyMechanism {
         });
         let Some(batch::AllModes { modes, counts, status }) = found else { return Ok(None) };
         let status = PyArray1::from_vec(py, status.iter().map(|&s| s as u8).collect());
-        Ok(Some((arrays(py, modes)?, counts, status)))
+        let batch = [modes.status.len()];
+        Ok(Some((arrays(py, modes, &batch)?, counts, status)))
     }
 
     /// The number of complex solutions for generic lengths; none where legs and constraints are not six equations.
@@ -506,10 +527,11 @@ impl PyMechanism {
         multipliers: Array<'py>,
         as_printed: bool,
     ) -> PyResult<Option<([usize; 2], Bound<'py, PyDict>)>> {
+        let batch = batch_of(&poses, 2);
         let (poses, multipliers) = (slice(&poses)?, slice(&multipliers)?);
         expect(multipliers, 6 - self.0.dof(), poses)?;
         let result = py.detach(|| batch::coupled_forces(&self.0, poses, multipliers, as_printed));
-        result.map(|(pair, table)| Ok((pair, arrays(py, table)?))).transpose()
+        result.map(|(pair, table)| Ok((pair, arrays(py, table, &batch)?))).transpose()
     }
 }
 
