@@ -139,8 +139,11 @@ def measure():
     say("instruction sets")
     results["instruction_sets"] = instruction_sets()
     say("memory")
+    # Without memory that earlier results have left.
     results["memory"] = [
-        row for task in Polypod.tasks for row in operations(f"memory {task}", threads[-1], [MEASURED])
+        row
+        for task in Polypod.tasks
+        for row in operations(f"memory {task}", threads[-1], [MEASURED], MIMALLOC_PURGE_DELAY="0")
     ]
     say("workspaces")
     results["workspaces"] = workspaces(threads[-1])
