@@ -214,6 +214,7 @@ def draw(results, path):
                     (5, 3),
                     textcoords="offset points",
                     fontsize=7,
+                    bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.4},
                 )
         axes.set(xscale="log", yscale="log", xlabel="states in a call", ylabel="time per state / ns")
         axes.set_title("Dotted: two threads. Points: other ways to inverse dynamics.")
