@@ -78,11 +78,12 @@ def curve(task, given, sizes):
     """Times of batches of growing size, the first a call for a single state."""
     rows, last = [], 0.0
     few = given.sized(100)
-    arrays = [*(getattr(few, name) for name in INPUTS[task]), *getattr(Polypod(few), task)()]
-    moved = sum(map(_size, arrays)) / 100
+    answer = getattr(Polypod(few), task)()
+    moved = _bytes_per_state([*(getattr(few, name) for name in INPUTS[task]), *answer])
     available = MEMORY * os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    most = available / _bytes_per_state([*vars(few).values(), *answer])
     for size in sizes:
-        too_much = size * last > LONGEST * 1e9 or size * _bytes_per_state(task, given) > available
+        too_much = size * last > LONGEST * 1e9 or size > most
         if size > Polypod.count and too_much:
             break
         call = getattr(Polypod(given.single() if size == 1 else given.sized(size)), task)
@@ -92,10 +93,9 @@ def curve(task, given, sizes):
     return rows
 
 
-def _bytes_per_state(task, given):
-    few = given.sized(100)
-    arrays = [*vars(few).values(), *getattr(Polypod(few), task)()]
-    return sum(_size(array) for array in arrays) / 100
+def _bytes_per_state(arrays):
+    """Of arrays of a hundred states."""
+    return sum(map(_size, arrays)) / 100
 
 
 def _size(given):

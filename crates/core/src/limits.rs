@@ -6,13 +6,14 @@
 use std::sync::Arc;
 
 use crate::clearance::{Hull, Segment, distance};
+use crate::forward_lanes::{Poses, get, store};
 use crate::joints::{self, Zero};
 use crate::lanes::{Lanes, Row, WIDTH};
 use crate::leg::{self, Position};
 use crate::mechanism::{Leg, Mechanism, Side};
 use crate::real::{Ordered, Real, Trig};
 use crate::singularity;
-use crate::spatial::{Mat3, Pose, Vec3};
+use crate::spatial::{Pose, Vec3};
 use crate::spec::{JointSpec, LegSpec, LimitsSpec, RodSpec, Spec};
 use crate::status::Status;
 
@@ -254,23 +255,17 @@ impl<T: Real> Seen<T> {
 /// The smallest singular value in each lane, one after the other: the rotations it takes differ from pose to pose.
 #[inline(always)]
 fn smallest<V: Lanes>(mech: &Mechanism, pose: &Pose<V>) -> V {
-    let [x, y, z] = pose.rotation.0;
-    let mut rows = [[0.0; WIDTH]; 12];
-    let columns = [x.array(), y.array(), z.array(), pose.o.array()];
-    for k in 0..12 {
-        columns[k / 3][k % 3].store(&mut rows[k]);
-    }
-    V::load(&smallest_of_each(mech, &rows, V::WIDTH))
+    let mut poses = [[0.0; WIDTH]; 12];
+    store(pose, &mut poses, 0);
+    V::load(&smallest_of_each(mech, &poses, V::WIDTH))
 }
 
-/// The same from the columns of R and o, of the first `count` lanes.
+/// The same of the first `count` lanes.
 #[inline(never)]
-fn smallest_of_each(mech: &Mechanism, rows: &[Row; 12], count: usize) -> Row {
+fn smallest_of_each(mech: &Mechanism, poses: &Poses, count: usize) -> Row {
     let mut found = [0.0; WIDTH];
     for (lane, sigma) in found.iter_mut().enumerate().take(count) {
-        let part = |k: usize| Vec3::new(rows[3 * k][lane], rows[3 * k + 1][lane], rows[3 * k + 2][lane]);
-        let pose = Pose { rotation: Mat3([part(0), part(1), part(2)]), o: part(3) };
-        *sigma = singularity::conditioning(mech, &pose, mech.characteristic_length).sigma_min;
+        *sigma = singularity::conditioning(mech, &get(poses, lane), mech.characteristic_length).sigma_min;
     }
     found
 }
