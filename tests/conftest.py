@@ -2,11 +2,25 @@
 
 from __future__ import annotations
 
+import os
 import re
+from dataclasses import dataclass, field
+from pathlib import Path
 
 import pytest
 
 from polypod import cli
+
+CHROMIUM = Path("/usr/bin/chromium")
+"""Debian's package, which a test machine has or lacks; Playwright's own downloads are not used."""
+
+SCREENSHOTS = Path(__file__).parents[1] / "build" / "screenshots"
+"""Pictures of pages, kept to be looked at."""
+
+_QUIET = (
+    *("--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-sync"),
+    *("--disable-background-networking", "--disable-component-update"),
+)
 
 
 @pytest.fixture
@@ -26,3 +40,71 @@ def run(request, monkeypatch, capsys):
         return exit.value.code or 0, out, err
 
     return run
+
+
+# --- pages in a real browser --------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="session")
+def browser():
+    """Debian's Chromium as a Playwright Browser; where CI is set it must be there, elsewhere it may lack."""
+    try:
+        from playwright.sync_api import sync_playwright
+    except ImportError as error:
+        _without_browser(f"Playwright is not installed ({error})")
+    if not CHROMIUM.is_file():
+        _without_browser(f"{CHROMIUM} is not there; on Debian: apt-get install chromium")
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=str(CHROMIUM), args=[*_QUIET])
+        yield browser
+        browser.close()
+
+
+def _without_browser(reason: str) -> None:
+    (pytest.fail if os.environ.get("CI") else pytest.skip)(f"no browser: {reason}")
+
+
+@dataclass
+class Watched:
+    """What a page said and asked for while it was open."""
+
+    errors: list[str] = field(default_factory=list)
+    """Errors on the console, and exceptions that nothing caught."""
+    warnings: list[str] = field(default_factory=list)
+    """Warnings on the console: of a graphics driver, too."""
+    requests: list[str] = field(default_factory=list)
+    """Addresses asked for over the network, web sockets too: neither file: nor data: nor blob: ones."""
+    failed: list[str] = field(default_factory=list)
+    """Addresses that could not be had."""
+
+
+@pytest.fixture
+def watch():
+    """Collects from then on what a page says and asks for; called before the page goes anywhere."""
+
+    def watch(page) -> Watched:
+        seen = Watched()
+
+        def hear(message) -> None:
+            lists = {"error": seen.errors, "warning": seen.warnings}
+            lists.get(message.type, []).append(message.text)
+
+        def note(request) -> None:
+            if not request.url.startswith(("file:", "data:", "blob:")):
+                seen.requests.append(request.url)
+
+        page.on("pageerror", lambda error: seen.errors.append(str(error)))
+        page.on("console", hear)
+        page.on("request", note)
+        page.on("websocket", lambda socket: seen.requests.append(socket.url))
+        page.on("requestfailed", lambda request: seen.failed.append(request.url))
+        return seen
+
+    return watch
+
+
+@pytest.fixture(scope="session")
+def screenshots() -> Path:
+    """The directory of pictures, made if need be."""
+    SCREENSHOTS.mkdir(parents=True, exist_ok=True)
+    return SCREENSHOTS
