@@ -91,34 +91,44 @@ def link_frames(mech: Mechanism, pose: ArrayLike) -> LinkFrames:
 
     Also at singular poses. Rods and legs have no place where `Mechanism.inverse_kinematics` has no answer.
     """
-    pose = np.asarray(pose, float)
-    legs = mech.inverse_kinematics(pose)
-    joints = mech.joint_reactions(pose, np.zeros(6), np.zeros(6))
-    rods, n = len(mech.rod_names), mech.n_legs
-    geometry = mech.geometry
-    starts = np.array([leg["base"]["point"] for leg in geometry["legs"]])
-    # The prismatic joint has the axes of its leg.
-    axes, known = _filled(joints.axes[..., rods + 1 :: 3, :, :], legs.directions, column=1)
-    lines = np.array([rod["axis"] for rod in geometry["rods"]]).reshape(-1, 3)
-    lines = np.broadcast_to(
-        lines / np.linalg.norm(lines, axis=-1, keepdims=True), (*pose.shape[:-2], rods, 3)
-    )
-    rod_axes, rod_known = _filled(joints.axes[..., :rods, :, :], lines, column=0)
+    return LinkPlaces(mech).at(pose)
 
-    frames = np.zeros((*pose.shape[:-2], 2 + rods + 2 * n, 4, 4))
-    frames[..., 3, 3] = 1.0
-    turn_known = np.ones(frames.shape[:-2], bool)
-    frames[..., 0, :3, :3] = np.eye(3)
-    frames[..., 1 : 1 + rods, :3, :3], turn_known[..., 1 : 1 + rods] = rod_axes, rod_known
-    frames[..., 1 : 1 + rods, :3, 3] = np.array([rod["point"] for rod in geometry["rods"]]).reshape(-1, 3)
-    for first, origin in ((1 + rods, starts), (2 + rods, starts + legs.vectors)):
-        span = slice(first, 1 + rods + 2 * n, 2)
-        frames[..., span, :3, :3], frames[..., span, :3, 3] = axes, origin
-        turn_known[..., span] = known
-    frames[..., -1, :, :] = pose
-    lost = np.isnan(frames).any(axis=(-2, -1))
-    frames[lost] = np.nan
-    return LinkFrames(frames, turn_known & ~lost, legs.status)
+
+class LinkPlaces:
+    """What `link_frames` tells, for those who ask again and again."""
+
+    def __init__(self, mech: Mechanism) -> None:
+        self._mech, geometry = mech, mech.geometry
+        self._starts = np.array([leg["base"]["point"] for leg in geometry["legs"]])
+        self._rod_points = np.array([rod["point"] for rod in geometry["rods"]]).reshape(-1, 3)
+        lines = np.array([rod["axis"] for rod in geometry["rods"]]).reshape(-1, 3)
+        self._rod_lines = lines / np.linalg.norm(lines, axis=-1, keepdims=True)
+
+    def at(self, pose: ArrayLike) -> LinkFrames:
+        """Where the links are at poses (..., 4, 4)."""
+        pose = np.asarray(pose, float)
+        legs = self._mech.inverse_kinematics(pose)
+        joints = self._mech.joint_reactions(pose, np.zeros(6), np.zeros(6))
+        rods, n = len(self._rod_points), self._mech.n_legs
+        # The prismatic joint has the axes of its leg.
+        axes, known = _filled(joints.axes[..., rods + 1 :: 3, :, :], legs.directions, column=1)
+        lines = np.broadcast_to(self._rod_lines, (*pose.shape[:-2], rods, 3))
+        rod_axes, rod_known = _filled(joints.axes[..., :rods, :, :], lines, column=0)
+
+        frames = np.zeros((*pose.shape[:-2], 2 + rods + 2 * n, 4, 4))
+        frames[..., 3, 3] = 1.0
+        turn_known = np.ones(frames.shape[:-2], bool)
+        frames[..., 0, :3, :3] = np.eye(3)
+        frames[..., 1 : 1 + rods, :3, :3], turn_known[..., 1 : 1 + rods] = rod_axes, rod_known
+        frames[..., 1 : 1 + rods, :3, 3] = self._rod_points
+        for first, origin in ((1 + rods, self._starts), (2 + rods, self._starts + legs.vectors)):
+            span = slice(first, 1 + rods + 2 * n, 2)
+            frames[..., span, :3, :3], frames[..., span, :3, 3] = axes, origin
+            turn_known[..., span] = known
+        frames[..., -1, :, :] = pose
+        lost = np.isnan(frames).any(axis=(-2, -1))
+        frames[lost] = np.nan
+        return LinkFrames(frames, turn_known & ~lost, legs.status)
 
 
 def _filled(axes: Array, lines: Array, column: int) -> tuple[Array, NDArray[np.bool_]]:
