@@ -57,6 +57,8 @@ class Screw:
     """(3,), unit."""
     pitch: float
     """m/rad; inf for a translation."""
+    velocity: Array
+    """(3,): of o, m/s, for a motion of the size that `Singularity.twist` has."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -259,7 +261,7 @@ class Model:
         loose = kind in (SingularityKind.ACTUATION, SingularityKind.CONSTRAINT)
         loose |= kind is SingularityKind.CONSTRAINT_VANISHES
         known = bool(np.isfinite(near.axis).all() and np.isfinite(near.point).all())
-        screw = Screw(near.point, near.axis, float(near.pitch)) if loose and known else None
+        screw = Screw(near.point, near.axis, float(near.pitch), near.twist[:3]) if loose and known else None
         return View(
             pose=pose,
             frames=self._places.at(pose).frames,
@@ -291,7 +293,9 @@ class Model:
 
     def singular_values(self) -> dict[str, tuple[float, float]]:
         """Nearest singular value of each coordinate below and above, the others kept; takes some ms."""
-        found = self.mech.singularity_distance(self.pose)
+        names = {"coordinates": self.names} if self.set == "pose" else {}
+        set = None if self.set == "tool" else self.set  # a direction's components cannot go one by one
+        found = self.mech.singularity_distance(self.pose, set, **names)
         pairs = zip(found.coordinates, found.singular.tolist(), strict=True)
         return {name: (float(low), float(high)) for name, (low, high) in pairs}
 
