@@ -20,6 +20,7 @@ COMMANDS = (
     "fk",
     "workspace",
     "verify",
+    "view",
 )
 
 app = typer.Typer(

@@ -51,6 +51,11 @@ class Track:
         return float(self.time[-1] - self.time[0])
 
     @property
+    def positions(self) -> Array:
+        """(j, 3): o at the rows that have a pose, m."""
+        return self.pose[np.isfinite(self.pose).all(axis=(1, 2)), :3, 3]
+
+    @property
     def words(self) -> str:
         """How much of the motion this is."""
         span = f"{self.name}: {self.time[0]:g} s to {self.time[-1]:g} s"

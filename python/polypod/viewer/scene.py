@@ -13,7 +13,7 @@ from polypod.bodies import PLATFORM, STEEL, Link, leg_radii
 from polypod.mechanism import Mechanism
 from polypod.singularity import NEAR_SINGULAR
 from polypod.style import SKY, YELLOW
-from polypod.viewer.state import Level, View
+from polypod.viewer.state import Level, Model, View
 from polypod.workspace import Workspace
 
 if TYPE_CHECKING:
@@ -42,6 +42,9 @@ LIGHT = 0.25
 
 FIELD_OF_VIEW = np.radians(40.0)
 
+_SHADOWS = ("plate", "barrel", "shaft", "bar")
+"""What throws a shadow worth its time."""
+
 _CREASE = np.radians(30.0)
 _FADE = 10.0
 """The platform begins to change its colour at so many times `NEAR_SINGULAR`."""
@@ -69,14 +72,19 @@ class Machine:
     def __init__(self, api: viser.SceneApi, links: tuple[Link, ...], root: str = "/machine") -> None:
         self._root = api.add_frame(root, show_axes=False)
         self._links = links
-        self._frames, self._legs = [], [[] for _ in links]  # type: ignore[var-annotated]
-        self._platform = []
+        self._frames: list[viser.FrameHandle] = []
+        self._legs: list[list[viser.MeshHandle]] = [[] for _ in links]
+        self._platform: list[viser.MeshHandle] = []
         for k, link in enumerate(links):
             self._frames.append(api.add_frame(f"{root}/{k}", show_axes=False))
             for j, piece in enumerate(link.pieces):
                 smooth = trimesh.graph.smooth_shade(piece.mesh, angle=_CREASE)
                 node = api.add_mesh_simple(
-                    f"{root}/{k}/{j}", smooth.vertices, smooth.faces, color=rgb(piece.color)
+                    f"{root}/{k}/{j}",
+                    smooth.vertices,
+                    smooth.faces,
+                    color=rgb(piece.color),
+                    cast_shadow=piece.name in _SHADOWS,
                 )
                 if link.kind in ("cylinder", "piston") and piece.color == STEEL:
                     self._legs[link.index].append(node)
@@ -87,11 +95,8 @@ class Machine:
         """Places the links and colours them."""
         self.place(view.frames)
         for nodes, level in zip(self._legs, view.leg_levels, strict=False):
-            for node in nodes:
-                node.color = rgb(LEVEL_COLORS[level])
-        color = platform_color(view.sigma_min)
-        for node in self._platform:
-            node.color = color
+            _paint(nodes, rgb(LEVEL_COLORS[level]))
+        _paint(self._platform, platform_color(view.sigma_min))
 
     def place(self, frames: Array) -> None:
         """Puts the links where frames (l, 4, 4) say, and hides those without a place."""
@@ -104,6 +109,12 @@ class Machine:
                 node.wxyz, node.position = turn, frame[:3, 3]
             if node.visible != visible:
                 node.visible = visible
+
+
+def _paint(nodes: list[viser.MeshHandle], color: Rgb) -> None:
+    for node in nodes:
+        if node.color != color:
+            node.color = color
 
 
 class Arrows:
@@ -168,17 +179,19 @@ class Arrows:
         node.visible = wanted
 
 
-def furnish(server: viser.ViserServer, mech: Mechanism, links: tuple[Link, ...], frames: Array) -> None:
-    """Light, ground and the camera's first place, for a machine of this size."""
-    corners = np.concatenate(
-        [
-            piece.mesh.bounds @ frame[:3, :3].T + frame[:3, 3]
-            for link, frame in zip(links, frames, strict=True)
-            if np.isfinite(frame).all()
-            for piece in link.pieces
-        ]
-    )
-    low, high = corners.min(axis=0), corners.max(axis=0)
+def furnish(server: viser.ViserServer, model: Model, frames: Array) -> None:
+    """Light, ground and the camera's first place, for a machine and a motion of this size."""
+    corners = [
+        piece.mesh.bounds @ frame[:3, :3].T + frame[:3, 3]
+        for link, frame in zip(model.links, frames, strict=True)
+        if np.isfinite(frame).all()
+        for piece in link.pieces
+    ]
+    if model.track is not None and len(model.track.positions):
+        around = model.mech.characteristic_length
+        corners += [model.track.positions - around, model.track.positions + around]
+    points = np.concatenate(corners)
+    low, high = points.min(axis=0), points.max(axis=0)
     middle, size = (low + high) / 2, float(np.linalg.norm(high - low))
     cell = float(10.0 ** np.floor(np.log10(size / 4.0)))
     server.scene.add_grid(
@@ -198,7 +211,7 @@ def furnish(server: viser.ViserServer, mech: Mechanism, links: tuple[Link, ...],
     )
     server.initial_camera.fov = FIELD_OF_VIEW
     server.initial_camera.look_at = (float(middle[0]), float(middle[1]), float(middle[2]))
-    eye = middle + 1.75 * size * way
+    eye = middle + 1.6 * size * way
     server.initial_camera.position = (float(eye[0]), float(eye[1]), float(eye[2]))
 
 

@@ -79,7 +79,7 @@ class Viewer:
         gui.configure_theme(show_logo=False, show_share_button=False, control_width="large")
         gui.main_panel.dock_right()
         view = self.model.view()
-        furnish(self._server, mech, self.model.links, view.frames)
+        furnish(self._server, self.model, view.frames)
         self._machine = Machine(scene, self.model.links)
         self._arrows = Arrows(scene, mech)
         self._arrows.force_scale = 0.0 if track is None else largest_force(mech, track)

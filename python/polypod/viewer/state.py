@@ -293,9 +293,9 @@ class Model:
 
     def singular_values(self) -> dict[str, tuple[float, float]]:
         """Nearest singular value of each coordinate below and above, the others kept; takes some ms."""
-        names = {"coordinates": self.names} if self.set == "pose" else {}
+        names = self.names if self.set == "pose" else None
         set = None if self.set == "tool" else self.set  # a direction's components cannot go one by one
-        found = self.mech.singularity_distance(self.pose, set, **names)
+        found = self.mech.singularity_distance(self.pose, set, coordinates=names)
         pairs = zip(found.coordinates, found.singular.tolist(), strict=True)
         return {name: (float(low), float(high)) for name, (low, high) in pairs}
 

@@ -21,7 +21,9 @@ _SHADES = {
     Level.BEYOND: ("#FDE7E9", RED),
 }
 _HEADS = {Level.FINE: "Fine", Level.NEAR: "Take care", Level.BEYOND: "Not possible"}
-_TEMPLATES = Environment(loader=PackageLoader("polypod.viewer"), autoescape=True, trim_blocks=True)
+_TEMPLATES = Environment(
+    loader=PackageLoader("polypod.viewer"), autoescape=True, trim_blocks=True, auto_reload=False
+)
 
 
 def scaled(name: str) -> tuple[float, str, int]:
