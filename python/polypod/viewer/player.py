@@ -65,10 +65,9 @@ class Track:
 
     def row_at(self, time: float) -> int:
         """The row nearest to a time."""
-        after = int(np.clip(np.searchsorted(self.time, time), 1, max(len(self.time) - 1, 1)))
-        before = after - 1
-        nearer = time - self.time[before] <= self.time[min(after, len(self.time) - 1)] - time
-        return before if nearer else after
+        after = min(int(np.searchsorted(self.time, time)), len(self.time) - 1)
+        before = max(after - 1, 0)
+        return before if time - self.time[before] <= self.time[after] - time else after
 
     def state(self, row: int) -> tuple[Array, Array, Array]:
         """Pose, twist and acceleration of a row; at rest where the motion has no rates there."""

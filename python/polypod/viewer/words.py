@@ -74,22 +74,26 @@ def numbers(
 
 def _cell(name: str, value: float) -> dict[str, str]:
     factor, unit, decimals = scaled(name)
-    text = f"{factor * value:.{decimals}f}" if math.isfinite(value) else "–"
+    text = _fixed(factor * value, decimals)
     return {"name": name, "symbol": _SYMBOLS.get(name, name), "text": text, "unit": unit}
+
+
+def _fixed(value: float, decimals: int = 1) -> str:
+    """A number without a minus before zero; a dash where there is none."""
+    return f"{round(value, decimals) + 0.0:.{decimals}f}" if math.isfinite(value) else "–"
 
 
 def _leg(view: View, mech: Mechanism, leg: int) -> dict[str, Any]:
     low, high = (float(end) for end in mech.stroke[leg])
     length, force, level = float(view.lengths[leg]), float(view.forces[leg]), view.leg_levels[leg]
     part = (length - low) / (high - low)
-    known = f"{force:.1f}" if math.isfinite(force) else "–"
     return {
         "name": mech.leg_names[leg],
         "color": color_of(leg),
         "at": 100.0 * min(max(part, 0.0), 1.0) if math.isfinite(high) else None,
         "shade": GREY if level is Level.FINE else LEVEL_COLORS[level],
         "length": 1e3 * length,
-        "force": known if mech.actuated[leg] else "passive",
+        "force": _fixed(force) if mech.actuated[leg] else "passive",
     }
 
 
@@ -98,10 +102,10 @@ def _screw(screw: Screw | None) -> str:
         return ""
     if math.isinf(screw.pitch):
         return "a translation"
-    return f"a turn about an axis, {1e3 * screw.pitch:.1f} mm/rad along it"
+    return f"a turn about an axis, with {_fixed(1e3 * screw.pitch)} mm/rad along it"
 
 
 def _range(name: str, low: float, high: float) -> dict[str, str]:
     factor, unit, _ = scaled(name)
-    below, above = (f"{factor * end:.1f}" if math.isfinite(end) else "none" for end in (low, high))
+    below, above = (_fixed(factor * end) if math.isfinite(end) else "none" for end in (low, high))
     return {"symbol": _SYMBOLS.get(name, name), "below": below, "above": above, "unit": unit}
