@@ -149,6 +149,19 @@ def test_it_listens_on_this_machine_only(viewer):
     assert host == "127.0.0.1"
 
 
+def test_a_change_is_answered_within_one_frame(viewer):
+    """Thirty pictures a second: by the time of the processor, whatever else the machine does."""
+    put_back(viewer)
+    wait_for(lambda: not viewer._worker._waiting)
+    times = []
+    for i in range(40):
+        start = time.thread_time()
+        assert viewer.model.set_coordinate("x", -0.326 + 1e-4 * i)
+        viewer._answer()
+        times.append(time.thread_time() - start)
+    assert np.median(times) < 1.0 / 30.0
+
+
 def test_names_from_a_file_are_texts(mech):
     """Names of legs are not part of the scene's names, nor HTML."""
     data = mech.to_dict()
@@ -212,6 +225,7 @@ def test_a_slider_moves_the_platform(page, viewer, mech, watch, screenshots):
     page.goto(viewer.url)
     page.locator("[data-polypod='x']").wait_for()
     page.locator("canvas").last.wait_for()
+    picture(page, screenshots, "viewer")
     start = viewer.model.pose.copy()
     type_into(page, "x / mm", -200)
     wait_for_number(page, "x", -200.0)
@@ -221,7 +235,7 @@ def test_a_slider_moves_the_platform(page, viewer, mech, watch, screenshots):
     for leg, length in enumerate(lengths, start=1):
         assert number(page, f"length {leg}") == pytest.approx(length, abs=0.051)
     assert number(page, "sigma_min") == pytest.approx(float(mech.conditioning(pose).sigma_min), abs=5.1e-5)
-    picture(page, screenshots, "viewer")
+    picture(page, screenshots, "viewer-limits")
     assert seen.errors == []
     assert seen.failed == []
     assert all(address.split("://")[1].startswith(viewer.url[7:]) for address in seen.requests)

@@ -155,12 +155,20 @@ class Overlays:
             x, y, _ = np.add(shift, mesh.bounds.mean(axis=0))
             above = (float(x), float(y), float(mesh.bounds[1, 2]) + 0.2 * mech.characteristic_length)
             self._modes.append(self._server.scene.add_label(f"/modes/name {k}", text, position=above))
+        self._step_back(1.2 * width * max(count, 1), depth)
         self._go.options = ("–", *texts)
         self._go.visible = self._away.visible = count > 0
         status = Status(int(modes.status))
         more = f" {count} of them are drawn." if count < total else ""
         doubt = "" if status is Status.OK else f" {status.message}."
         self._say(self._told, f"{total} poses have these leg lengths.{more}{doubt}")
+
+    def _step_back(self, width: float, depth: float) -> None:
+        """Moves the cameras of all pages so far back that the row is seen."""
+        height = self._model.mech.characteristic_length
+        for client in self._server.get_clients().values():
+            client.camera.position = (0.0, -width, 0.45 * width)
+            client.camera.look_at = (0.0, depth, height)
 
     def _mesh(self, pose: Array) -> trimesh.Trimesh:
         """The whole mechanism at a pose, smooth where it is round."""
