@@ -144,18 +144,20 @@ class Overlays:
         self._poses = [modes.pose[k] for k in range(count)]
         texts = []
         meshes = [self._mesh(pose) for pose in self._poses]
-        # As wide as the widest, so that none stands in another.
-        width = 1.15 * max((float(np.ptp(mesh.bounds[:, 0])) for mesh in meshes), default=1.0)
+        gap = 1.5 * mech.characteristic_length
+        widths = [float(np.ptp(mesh.bounds[:, 0])) + gap for mesh in meshes]
         depth = 1.3 * max((float(np.ptp(mesh.bounds[:, 1])) for mesh in meshes), default=1.0)
-        for k, (pose, mesh) in enumerate(zip(self._poses, meshes, strict=True)):
-            shift = (width * (k - (count - 1) / 2), depth, 0.0)
+        left = -sum(widths) / 2
+        for k, (pose, mesh, width) in enumerate(zip(self._poses, meshes, widths, strict=True)):
+            shift = (left + gap / 2 - float(mesh.bounds[0, 0]), depth, 0.0)
+            left += width
             self._modes.append(self._server.scene.add_mesh_trimesh(f"/modes/{k}", mesh, position=shift))
             text = _mode_words(modes, k, bool(np.linalg.norm(pose - present) < 1e-6))
             texts.append(text)
             x, y, _ = np.add(shift, mesh.bounds.mean(axis=0))
             above = (float(x), float(y), float(mesh.bounds[1, 2]) + 0.2 * mech.characteristic_length)
             self._modes.append(self._server.scene.add_label(f"/modes/name {k}", text, position=above))
-        self._step_back(1.2 * width * max(count, 1), depth)
+        self._step_back(1.3 * sum(widths), depth)
         self._go.options = ("–", *texts)
         self._go.visible = self._away.visible = count > 0
         status = Status(int(modes.status))
@@ -164,10 +166,10 @@ class Overlays:
         self._say(self._told, f"{total} poses have these leg lengths.{more}{doubt}")
 
     def _step_back(self, width: float, depth: float) -> None:
-        """Moves the cameras of all pages so far back that the row is seen."""
+        """Moves the cameras of all pages back until they see a row of this width."""
         height = self._model.mech.characteristic_length
         for client in self._server.get_clients().values():
-            client.camera.position = (0.0, -width, 0.45 * width)
+            client.camera.position = (0.0, -width, 0.4 * width)
             client.camera.look_at = (0.0, depth, height)
 
     def _mesh(self, pose: Array) -> trimesh.Trimesh:
