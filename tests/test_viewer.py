@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 import polypod as pp
+import polypod.answers
 from polypod.errors import UnknownNameError
 from polypod.viewer import words
 from polypod.viewer.guard import is_own_page, is_update, is_value
@@ -142,6 +143,20 @@ def test_lengths_of_another_mode_are_refused(mech):
     assert refused > 0
 
 
+def test_a_pose_of_another_mode_is_no_answer(model, monkeypatch):
+    """The core may have a pose and say that it lies in another mode: the page does not go there."""
+
+    def jump(self, lengths, guess=None):
+        numbers = np.array(0.0), np.array(1.0), np.array(pp.Status.MODE_JUMP, np.uint8)
+        return pp.answers.ForwardKinematics(self.home, *numbers)
+
+    pose = model.pose.copy()
+    monkeypatch.setattr(pp.Mechanism, "forward_kinematics", jump)
+    assert not model.set_length(0, 0.7)
+    assert "another mode" in model.refusal
+    np.testing.assert_array_equal(model.pose, pose)
+
+
 def test_a_passive_leg_follows():
     data = pp.load(DATA / "stewart-gough.toml").to_dict()
     data.pop("published", None)
@@ -262,6 +277,21 @@ def test_huge_motions_are_thinned_and_say_so(mech, motion):
     few = track_of(mech, motion)
     assert few.words == f"{NAME}: 0 s to 8 s, 801 rows."
     assert few.total == len(few.time) == 801
+
+
+def test_poses_are_followed_from_one_part_of_a_motion_to_the_next(mech, motion, monkeypatch):
+    guesses, state = [], pp.Mechanism.state
+
+    def heard(self, *args, guess=None, **more):
+        guesses.append(guess)
+        return state(self, *args, guess=guess, **more)
+
+    monkeypatch.setattr("polypod.viewer.player._CHUNK", 300)
+    monkeypatch.setattr(pp.Mechanism, "state", heard)
+    track = track_of(mech, motion)
+    assert guesses[0] is None
+    np.testing.assert_array_equal(guesses[1:], track.pose[[299, 599]])
+    assert len(track.time) == 801
 
 
 def test_rows_without_a_pose_are_refused(mech):
