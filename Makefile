@@ -45,7 +45,7 @@ test-all: tools $(BUILT) ## all tests, the slow ones too
 tools: ## what some tests use beside Python and Rust; on Debian, as root, it is installed
 	@if ! command -v dpkg-query apt-get >/dev/null; \
 	then echo "no Debian: tests that need $(DEBIAN) are left out"; \
-	elif dpkg-query --show $(DEBIAN) >/dev/null 2>&1; then :; \
+	elif [ -z "$$(dpkg-query -Wf '$${db:Status-Status}\n' $(DEBIAN) 2>&1 | grep -vx installed)" ]; then :; \
 	elif [ "$$(id -u)" = 0 ]; then apt-get update -qq && apt-get install -qq -y --no-install-recommends $(DEBIAN) >/dev/null; \
 	else echo "tests that need them are left out; to have them: sudo apt-get install $(DEBIAN)"; fi
 
