@@ -331,7 +331,11 @@ class Mechanism:
             for key in ("coordinates", "coordinate_rates", "coordinate_second_rates")
         ]
         return State(
-            out["pose"], out["twist"], out["acceleration"], split[0], split[1], split[2], out["status"]
+            self,
+            **{name: out[name] for name in ("pose", "twist", "acceleration", "status")},
+            coordinates=split[0],
+            coordinate_rates=split[1],
+            coordinate_second_rates=split[2],
         )
 
     def coordinates(self, pose: ArrayLike, set: str | None = None) -> dict[str, Array]:
@@ -377,7 +381,7 @@ class Mechanism:
         [0.7487, 0.7441, 0.7487, 0.7544, 0.7544]
         """
         (poses,) = POSE(pose)
-        return InverseKinematics(**self._core.inverse_kinematics(poses))
+        return InverseKinematics(self, **self._core.inverse_kinematics(poses))
 
     def jacobian(self, pose: ArrayLike) -> Array:
         """(..., 6, 6): J of `J V = (ℓ', 0)`: actuated legs, then independent constraints [Eq. 13].
@@ -401,7 +405,7 @@ class Mechanism:
         A twist or acceleration that breaks a constraint has the status OFF_CONSTRAINT and no numbers.
         """
         states = MOTION(pose, twist, acceleration)
-        return Kinematics(**self._core.kinematics(*states))
+        return Kinematics(self, **self._core.kinematics(*states))
 
     def platform_twist(self, pose: ArrayLike, rates: ArrayLike) -> tuple[Array, Codes]:
         """The twist (..., 6) that gives the legs these rates (..., n), m/s, and the status [Eq. 13]."""
@@ -427,7 +431,7 @@ class Mechanism:
         `characteristic_length`.
         """
         (poses,) = POSE(pose)
-        return Conditioning(**self._core.conditioning(poses, self._length(length)))
+        return Conditioning(self, **self._core.conditioning(poses, self._length(length)))
 
     def determinant(
         self, pose: ArrayLike, twist: ArrayLike = (0.0,) * 6, *, length: float | None = None
@@ -440,7 +444,7 @@ class Mechanism:
             length: what turns are counted with, m; `characteristic_length` by default.
         """
         poses, twists = MOVING(pose, twist)
-        return Determinant(**self._core.determinant(poses, twists, self._length(length)))
+        return Determinant(self, **self._core.determinant(poses, twists, self._length(length)))
 
     def singularity(
         self, pose: ArrayLike, *, length: float | None = None, tolerance: float = TOLERANCE
@@ -467,7 +471,7 @@ class Mechanism:
             raise PolypodError(f"tolerance is {tolerance!r}; must be zero or more")
         (poses,) = POSE(pose)
         out = self._core.singularity(poses, self._length(length), float(tolerance))
-        return Singularity(**out | {name: codes(out[name]) for name in ("kind", "leg", "uncontrolled")})
+        return Singularity(self, **out | {name: codes(out[name]) for name in ("kind", "leg", "uncontrolled")})
 
     def singularity_distance(
         self,
@@ -509,15 +513,9 @@ class Mechanism:
             poses, set, named, self._length(length), _positive("reach", reach)
         )
         out = table
-        return SingularityDistance(
-            tuple(names),
-            out["value"],
-            out["singular"],
-            np.abs(out["singular"] - out["value"][..., None]),
-            codes(out["kind"]),
-            out["searched"],
-            out["status"],
-        )
+        distance = np.abs(out["singular"] - out["value"][..., None])
+        named_kind = {"kind": codes(out["kind"])}
+        return SingularityDistance(self, coordinates=tuple(names), distance=distance, **out | named_kind)
 
     def _varied_coordinates(
         self, set: str | None, coordinates: Sequence[str] | None
@@ -572,7 +570,7 @@ class Mechanism:
             (lengths,), guesses = self._lengths(lengths), None
         else:
             lengths, guesses = self._guessed_lengths(lengths, guess)
-        return ForwardKinematics(**self._core.forward_kinematics(lengths, guesses, continued))
+        return ForwardKinematics(self, **self._core.forward_kinematics(lengths, guesses, continued))
 
     def assembly_modes(self, lengths: ArrayLike) -> AssemblyModes:
         """All real poses with the given leg lengths [T28, T29].
@@ -610,7 +608,7 @@ class Mechanism:
         padded["mode_status"] = padded.pop("status")
         batch = lengths.shape[:-1]
         modes = {name: a.reshape(batch + a.shape[1:]) for name, a in padded.items()}
-        return AssemblyModes(**modes, number=count.reshape(batch), status=status.reshape(batch))
+        return AssemblyModes(self, **modes, number=count.reshape(batch), status=status.reshape(batch))
 
     # --- workspace ---------------------------------------------------------------------------------------
 
@@ -754,7 +752,7 @@ class Mechanism:
         [-13151.0, 9809.0, -4907.0, -1993.0, 10231.0]
         """
         args = MOTION.loaded(wrench, wrench_axes, pose, twist, acceleration)
-        return InverseDynamics(**self._core.inverse_dynamics(*args))
+        return InverseDynamics(self, **self._core.inverse_dynamics(*args))
 
     @cached_property
     def joint_list(self) -> tuple[Joint, ...]:
@@ -802,7 +800,7 @@ class Mechanism:
         args = (*args, self._length(length))
         out = self._core.joint_reactions(*args)
         marks = {name: out[name] == 1.0 for name in ("determinate", "determinate_in_joint")}
-        return JointReactions(self.joint_list, **out | marks)
+        return JointReactions(self, joints=self.joint_list, **out | marks)
 
     def forward_dynamics(
         self,
@@ -833,7 +831,7 @@ class Mechanism:
         True
         """
         args = self._driven.loaded(wrench, wrench_axes, pose, twist, forces)
-        return ForwardDynamics(**self._core.forward_dynamics(*args))
+        return ForwardDynamics(self, **self._core.forward_dynamics(*args))
 
     def equations_of_motion(
         self, pose: ArrayLike, twist: ArrayLike, coordinates: str | Sequence[str] | None = None
@@ -871,7 +869,7 @@ class Mechanism:
                 f"take one of {', '.join(name for name in self._sets if name != 'tool')}"
             )
         found, table = self._core.equations_of_motion(poses, twists, set, names)
-        return EquationsOfMotion(coordinates=tuple(found), **table)
+        return EquationsOfMotion(self, coordinates=tuple(found), **table)
 
     def power(
         self,
@@ -883,7 +881,7 @@ class Mechanism:
     ) -> Power:
         """Energies and every power of their balance [T17]. Arguments as for `inverse_dynamics`."""
         args = MOTION.loaded(wrench, wrench_axes, pose, twist, acceleration)
-        return Power(**self._core.power(*args))
+        return Power(self, **self._core.power(*args))
 
     def simulate(
         self,
@@ -999,7 +997,9 @@ class Mechanism:
         _, bodies, _ = _core.inertial_parameters(self._core)
         geometry = _core.geometry_parameters(self._core)
         arrays = table
-        return InverseDynamicsDerivatives(tuple(names), tuple(bodies), tuple(geometry), **arrays)
+        return InverseDynamicsDerivatives(
+            self, coordinates=tuple(names), bodies=tuple(bodies), geometry=tuple(geometry), **arrays
+        )
 
     def regressor(
         self,
@@ -1023,7 +1023,7 @@ class Mechanism:
         args = MOTION.loaded(wrench, wrench_axes, pose, twist, acceleration)
         out = _core.regressor(self._core, *args)
         names, _, values = _core.inertial_parameters(self._core)
-        return Regressor(tuple(names), values, **out)
+        return Regressor(self, names=tuple(names), values=values, **out)
 
     def base_parameters(self) -> BaseParameters:
         """The minimal set of inertial parameters, those combinations that active forces can tell apart [T58].
@@ -1050,12 +1050,13 @@ class Mechanism:
         columns, combination, remainders = found
         names, _, values = _core.inertial_parameters(self._core)
         return BaseParameters(
-            tuple(names[i] for i in columns),
-            np.array(columns, dtype=np.int64),
-            combination,
-            combination @ values,
-            tuple(names),
-            remainders,
+            self,
+            names=tuple(names[i] for i in columns),
+            columns=np.array(columns, dtype=np.int64),
+            combination=combination,
+            values=combination @ values,
+            parameters=tuple(names),
+            remainders=remainders,
         )
 
     # --- limits ------------------------------------------------------------------------------------------
@@ -1105,12 +1106,13 @@ class Mechanism:
         out = self._core.limits(*args)
         binding = out["binding"]
         return Limits(
-            self._limit_names,
-            out["margins"],
-            out["relative"],
-            np.where(np.isnan(binding), -1, binding).astype(np.int64),
-            out["within"] == 1.0,
-            out["status"],
+            self,
+            names=self._limit_names,
+            margins=out["margins"],
+            relative=out["relative"],
+            binding=np.where(np.isnan(binding), -1, binding).astype(np.int64),
+            within=out["within"] == 1.0,
+            status=out["status"],
         )
 
     def coupled_forces(
@@ -1131,7 +1133,7 @@ class Mechanism:
         if result is None:
             raise CoordinateError(f"{self.name} has no two legs that share a constraint on one rod")
         first, second = result[0]
-        return CoupledForces((self.leg_names[first], self.leg_names[second]), **result[1])
+        return CoupledForces(self, legs=(self.leg_names[first], self.leg_names[second]), **result[1])
 
 
 def _plain(value: Any) -> Any:

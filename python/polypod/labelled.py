@@ -1,0 +1,186 @@
+"""What answers have in common: names and units for their arrays, datasets, and how they show themselves."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from polypod.errors import ShapeError
+from polypod.notebook import Rows, card, numbers, outcomes, rows_of
+from polypod.status import Status
+from polypod.variables import DIMENSIONS, HALVES, POSE, Variable, coords_of, variable
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from polypod.mechanism import Mechanism
+
+
+class Quantity(NamedTuple):
+    """An array with what it is."""
+
+    name: str
+    """The attribute of the answer, and the variable of its dataset."""
+    key: str
+    """Its name in `polypod.variables` and in the dataset of a solution."""
+    about: Variable
+    values: NDArray[Any]
+
+    @property
+    def shown(self) -> str:
+        """The numbers with their unit, of many the range; or what codes stand for."""
+        _, unit, _, _, flags = about = self.about
+        if flags is not None:
+            return outcomes(self.values, flags)
+        if about.dims[-2:] == POSE:
+            return f"o at {numbers(self.values[..., :3, 3])} m"
+        first, mixed, second = unit.partition(" and ")
+        if mixed and about.dims[-1:] and about.dims[-1] in HALVES:
+            return f"{numbers(self.values[..., :3])} {first}; {numbers(self.values[..., 3:])} {second}"
+        return f"{numbers(self.values)} {'' if unit == '1' else unit}".rstrip()
+
+    @property
+    def header(self) -> str:
+        """Such as "lengths r / m"."""
+        symbol, unit = self.about.symbol, self.about.unit
+        return f"{self.name} {symbol}".rstrip() + (f" / {unit}" if unit not in ("", "1") else "")
+
+
+@dataclass(frozen=True, eq=False, init=False, repr=False)
+class Answer:
+    """Named arrays over a batch of states: what a mechanism answers.
+
+    Subclasses are dataclasses; they say in `_variables` which quantity each of their arrays is.
+    """
+
+    mech: Mechanism
+    """The mechanism that was asked."""
+
+    _variables: ClassVar[dict[str, str]]
+    """Array → its quantity, a name of `polypod.variables`."""
+    _same_for_all: ClassVar[frozenset[str]] = frozenset()
+    """Arrays that do not have the leading axes of the batch."""
+
+    def __init__(self, mech: Mechanism, **values: Any) -> None:
+        # A controller has one made at every step: this takes a third of a frozen dataclass's own time.
+        vars(self).update(values, mech=mech)
+
+    @property
+    def batch(self) -> tuple[int, ...]:
+        """Leading axes: () for one state."""
+        status = getattr(self, "status", None)
+        return () if status is None else np.shape(status)
+
+    @property
+    def arrays(self) -> dict[str, NDArray[Any]]:
+        """Its arrays by name."""
+        return {name: getattr(self, name) for name in self._variables}
+
+    def labels(self) -> dict[str, Sequence[Any]]:
+        """Names along dimensions that only this answer knows."""
+        return {}
+
+    def quantities(self) -> list[Quantity]:
+        """Its arrays with what they are."""
+        return [
+            Quantity(name, key, variable(key), np.asarray(array))
+            for (name, array), key in zip(self.arrays.items(), self._variables.values(), strict=True)
+        ]
+
+    def to_xarray(self, *states: str) -> xr.Dataset:
+        """The arrays as one dataset: legs, axes and so on by name, units and long names as attributes.
+
+        Variables have the names of the attributes here.
+
+        Args:
+            states: names for the batch's axes; by default `state`, or `state_1`, `state_2`, ... for several.
+
+        Raises:
+            ShapeError: not one name for each axis, or a name that the dataset needs itself.
+
+        >>> import polypod as pp
+        >>> mech = pp.load("lu-3spu-2rpu-r")
+        >>> poses = mech.pose({"alpha": 0.1, "p": -0.3, "h": [0.6, 0.7], "beta": 0.8, "gamma": 0.6})
+        >>> legs = mech.inverse_kinematics(poses).to_xarray("height")
+        >>> legs.lengths.dims, legs.lengths.attrs["units"]
+        (('height', 'leg'), 'm')
+        """
+        import xarray as xr
+
+        leading = self._state_dims(states)
+        data, dims = {}, {*leading}
+        for quantity in self.quantities():
+            values, about = quantity.values, quantity.about
+            if 0 in values.shape[values.ndim - len(about.dims) :]:
+                continue  # a mechanism without rods or constraints has no such variables
+            if values.dtype.kind == "b" or about.flags is not None:
+                values = values.astype(np.int8)  # as files hold them
+            of = about.dims if quantity.name in self._same_for_all else (*leading, *about.dims)
+            # A variable may not have the name of a dimension.
+            name = quantity.key if quantity.name in DIMENSIONS else quantity.name
+            data[name] = (of, values, about.attributes)
+            dims |= {*of}
+        coords = coords_of(self.mech, dims, self.labels())
+        title, _ = self._heading()
+        return xr.Dataset(data, coords, {"title": title, "mechanism": self.mech.name})
+
+    def _state_dims(self, states: Sequence[str]) -> tuple[str, ...]:
+        count = len(self.batch)
+        if not states:
+            return ("state",) if count == 1 else tuple(f"state_{i + 1}" for i in range(count))
+        if len(states) != count:
+            raise ShapeError(f"states: {len(states)} names for the leading axes {self.batch}; needs {count}")
+        own = {quantity.name for quantity in self.quantities()} | DIMENSIONS | self.labels().keys()
+        for name in states:
+            if name in own or states.count(name) > 1:
+                raise ShapeError(f"states: {name!r} is another name of the dataset; choose a new one")
+        return tuple(states)
+
+    def _heading(self) -> tuple[str, str]:
+        """What it is, and of how many states with which outcomes."""
+        title, said = f"{type(self).__name__} of {self.mech.name}", []
+        if self.batch:
+            product = " × ".join(map(str, self.batch))
+            total = int(np.prod(self.batch))
+            said.append(f"{product} = {total} states" if len(self.batch) > 1 else f"{total} states")
+        if hasattr(self, "status"):
+            said.append(outcomes(self.status, Status))
+        return title, ": ".join(said)
+
+    def __repr__(self) -> str:
+        title, said = self._heading()
+        quantities = [q for q in self.quantities() if q.name != "status"]
+        width = max(len(q.name) for q in quantities)
+        lines = [f"  {q.name:<{width}}  {q.shown}" for q in quantities]
+        return "\n".join([f"{title}: {said}" if said else title, *lines])
+
+    def _repr_html_(self) -> str:
+        """For notebooks: states by status, a row for each leg, rod or limit, then everything else."""
+        title, said = self._heading()
+        quantities = [q for q in self.quantities() if q.name != "status"]
+        tables, told = [], set()
+        for dim, labels in self._row_labels(quantities).items():
+            columns = [q for q in quantities if q.about.dims == (dim,)]
+            told |= {q.name for q in columns}
+            tables.append(self._by_label(dim, labels, columns))
+        rest = [
+            (q.name, q.about.long_name, " × ".join(q.about.dims), q.shown)
+            for q in quantities
+            if q.name not in told
+        ]
+        tables.append(rows_of(("", "", "for each", ""), rest))
+        return card(title, said, tables)
+
+    def _row_labels(self, quantities: Sequence[Quantity]) -> dict[str, Sequence[Any]]:
+        """Dimensions that are rows of a table of their own, with their labels."""
+        dims = dict.fromkeys(q.about.dims[0] for q in quantities if len(q.about.dims) == 1 and q.values.size)
+        shown = coords_of(self.mech, {*dims}, self.labels())
+        return {dim: shown[dim] for dim in dims if dim in shown and dim not in ("axis", "component")}
+
+    def _by_label(self, dim: str, labels: Sequence[Any], columns: Sequence[Quantity]) -> Rows:
+        rows = ((str(label), *(numbers(q.values[..., i]) for q in columns)) for i, label in enumerate(labels))
+        return rows_of((dim.replace("_", " "), *(q.header for q in columns)), rows)
