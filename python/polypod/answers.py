@@ -530,3 +530,8 @@ class Mobility:
     graph_links: tuple[GraphLink, ...]
     graph_joints: tuple[GraphJoint, ...]
     published: Published | None
+
+    def _repr_html_(self) -> str:
+        from polypod.cards import of_mobility
+
+        return of_mobility(self)

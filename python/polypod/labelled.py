@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from polypod.errors import ShapeError
-from polypod.notebook import Rows, card, numbers, outcomes, rows_of
+from polypod.notebook import Rows, card, counted, numbers, outcomes, rows_of
 from polypod.status import Status
 from polypod.variables import DIMENSIONS, HALVES, POSE, Variable, coords_of, variable
 
@@ -31,22 +31,35 @@ class Quantity(NamedTuple):
     values: NDArray[Any]
 
     @property
+    def unit_differs(self) -> bool:
+        """Whether the unit is that of the label, such as a limit."""
+        return " or " in self.about.unit and self.about.dims in (("limit",), ("coordinate",))
+
+    def at(self, index: int, unit: str) -> str:
+        """What stands at a place of the last dimension, whose label has that unit."""
+        values, flags = self.values[..., index], self.about.flags
+        if flags is not None:
+            return outcomes(values, flags)
+        return numbers(values, unit if self.unit_differs else "1")
+
+    @property
     def shown(self) -> str:
         """The numbers with their unit, of many the range; or what codes stand for."""
         _, unit, _, _, flags = about = self.about
         if flags is not None:
             return outcomes(self.values, flags)
         if about.dims[-2:] == POSE:
-            return f"o at {numbers(self.values[..., :3, 3])} m"
+            return f"o at {numbers(self.values[..., :3, 3], 'm')}"
         first, mixed, second = unit.partition(" and ")
         if mixed and about.dims[-1:] and about.dims[-1] in HALVES:
-            return f"{numbers(self.values[..., :3])} {first}; {numbers(self.values[..., 3:])} {second}"
-        return f"{numbers(self.values)} {'' if unit == '1' else unit}".rstrip()
+            return f"{numbers(self.values[..., :3], first)}; {numbers(self.values[..., 3:], second)}"
+        return numbers(self.values, unit)
 
     @property
     def header(self) -> str:
         """Such as "lengths r / m"."""
         symbol, unit = self.about.symbol, self.about.unit
+        unit = "" if self.unit_differs else unit
         return f"{self.name} {symbol}".rstrip() + (f" / {unit}" if unit not in ("", "1") else "")
 
 
@@ -146,7 +159,7 @@ class Answer:
         if self.batch:
             product = " × ".join(map(str, self.batch))
             total = int(np.prod(self.batch))
-            said.append(f"{product} = {total} states" if len(self.batch) > 1 else f"{total} states")
+            said.append(f"{product} = {total} states" if len(self.batch) > 1 else counted(total))
         if hasattr(self, "status"):
             said.append(outcomes(self.status, Status))
         return title, ": ".join(said)
@@ -162,25 +175,31 @@ class Answer:
         """For notebooks: states by status, a row for each leg, rod or limit, then everything else."""
         title, said = self._heading()
         quantities = [q for q in self.quantities() if q.name != "status"]
+        named = coords_of(self.mech, {dim for q in quantities for dim in q.about.dims}, self.labels())
         tables, told = [], set()
-        for dim, labels in self._row_labels(quantities).items():
-            columns = [q for q in quantities if q.about.dims == (dim,)]
-            told |= {q.name for q in columns}
-            tables.append(self._by_label(dim, labels, columns))
+        for dim, labels in named.items():
+            columns = [q for q in quantities if q.about.dims == (dim,) and dim not in _SHOWN_WHOLE]
+            if columns:
+                _, units = named.get(f"{dim}_unit", (dim, ["1"] * len(labels)))
+                tables.append(_by_label(dim, labels, units, columns))
+                told |= {q.name for q in columns}
         rest = [
             (q.name, q.about.long_name, " × ".join(q.about.dims), q.shown)
             for q in quantities
             if q.name not in told
         ]
-        tables.append(rows_of(("", "", "for each", ""), rest))
+        tables.append(Rows(("", "", "for each", ""), rest, texts=4))
         return card(title, said, tables)
 
-    def _row_labels(self, quantities: Sequence[Quantity]) -> dict[str, Sequence[Any]]:
-        """Dimensions that are rows of a table of their own, with their labels."""
-        dims = dict.fromkeys(q.about.dims[0] for q in quantities if len(q.about.dims) == 1 and q.values.size)
-        shown = coords_of(self.mech, {*dims}, self.labels())
-        return {dim: shown[dim] for dim in dims if dim in shown and dim not in ("axis", "component")}
 
-    def _by_label(self, dim: str, labels: Sequence[Any], columns: Sequence[Quantity]) -> Rows:
-        rows = ((str(label), *(numbers(q.values[..., i]) for q in columns)) for i, label in enumerate(labels))
-        return rows_of((dim.replace("_", " "), *(q.header for q in columns)), rows)
+_SHOWN_WHOLE = ("axis", "component")
+"""Dimensions that are no rows of a table."""
+
+
+def _by_label(dim: str, labels: Sequence[Any], units: Sequence[str], columns: Sequence[Quantity]) -> Rows:
+    """A row for each label."""
+    rows = [
+        (str(label), *(q.at(i, unit) for q in columns))
+        for i, (label, unit) in enumerate(zip(labels, units, strict=True))
+    ]
+    return rows_of((dim.replace("_", " "), *(q.header for q in columns)), rows)

@@ -144,6 +144,11 @@ class Mechanism:
     def __repr__(self) -> str:
         return f"<Mechanism {self.name}: {'+'.join(self.leg_letters)}, {self.dof} freedoms>"
 
+    def _repr_html_(self) -> str:
+        from polypod.cards import of_mechanism
+
+        return of_mechanism(self)
+
     # --- what it is --------------------------------------------------------------------------------------
 
     @property

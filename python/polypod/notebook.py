@@ -18,37 +18,38 @@ MOST_NUMBERS = 6
 """That are shown one by one; of more the range."""
 
 _CARD = """\
-<div class="polypod" style="max-width: 62em; overflow-x: auto">
+<div class="polypod" style="max-width: 75em; overflow-x: auto">
 <div><b>{{ title }}</b>{% if subtitle %} &ensp;{{ subtitle }}{% endif %}</div>
 {% for note in notes %}<div style="opacity: .75; font-size: 90%">{{ note }}</div>
 {% endfor %}{% if picture %}<img alt="{{ title }}" style="max-width: 22em" \
 src="data:image/png;base64,{{ picture }}">
 {% endif %}{% for table in tables %}<table style="margin: .5em 0; font-variant-numeric: tabular-nums">
-{% if table.caption %}<caption style="text-align: left; font-weight: bold">{{ table.caption }}</caption>
-{% endif %}<thead><tr>{% for header in table.headers %}<th style="text-align: \
-{{ 'left' if loop.first else 'right' }}">{{ header }}</th>{% endfor %}</tr></thead>
+<thead><tr>{% for header in table.headers %}<th style="text-align: \
+{{ 'left' if loop.index <= table.texts else 'right' }}">{{ header }}</th>{% endfor %}</tr></thead>
 <tbody>
-{% for row in table.rows %}<tr>{% for cell in row %}<td style="text-align: \
-{{ 'left' if loop.first else 'right' }}">{{ cell }}</td>{% endfor %}</tr>
+{% for row in table.rows %}<tr>{% for cell in row %}<td style="\
+{{ 'text-align: left' if loop.index <= table.texts else 'text-align: right; white-space: nowrap' }}">\
+{{ cell }}</td>{% endfor %}</tr>
 {% endfor %}</tbody></table>
 {% if table.left_out %}<div style="opacity: .75; font-size: 90%">… and {{ table.left_out }} more</div>
 {% endif %}{% endfor %}</div>"""
 
 
 class Rows(NamedTuple):
-    """A table; the first column stands to the left, the others to the right."""
+    """A table."""
 
     headers: Sequence[str]
     rows: Sequence[Sequence[str]]
-    caption: str = ""
+    texts: int = 1
+    """Columns that hold texts and stand to the left; the others are numbers."""
     left_out: int = 0
     """Rows that are not shown."""
 
 
-def rows_of(headers: Sequence[str], rows: Iterable[Sequence[str]], caption: str = "") -> Rows:
+def rows_of(headers: Sequence[str], rows: Iterable[Sequence[str]], texts: int = 1) -> Rows:
     """A table with its first rows and the number of the others."""
     every = [*rows]
-    return Rows(headers, every[:MOST_ROWS], caption, max(len(every) - MOST_ROWS, 0))
+    return Rows(headers, every[:MOST_ROWS], texts, max(len(every) - MOST_ROWS, 0))
 
 
 @cache
@@ -75,26 +76,29 @@ def card(
     return html
 
 
+def counted(states: int) -> str:
+    """Such as 801 states."""
+    return f"{states} state{'' if states == 1 else 's'}"
+
+
 def number(value: float) -> str:
     """A number to five digits; NaN is shown as such."""
     return f"{value + 0.0:.5g}".replace("-", "−").replace("nan", "NaN")
 
 
-def numbers(values: ArrayLike) -> str:
+def numbers(values: ArrayLike, unit: str = "1") -> str:
     """A few numbers one by one; of many the least and the greatest, and how many are NaN."""
     array: NDArray[Any] = np.asarray(values)
+    unit = "" if unit == "1" else f" {unit}"
     if array.size == 0:
         return "none"
     if array.size <= MOST_NUMBERS:
-        return ", ".join(number(value) for value in array.ravel().tolist())
-    if array.dtype.kind == "f":
-        missing = int(np.count_nonzero(np.isnan(array)))
-        if missing == array.size:
-            return "all NaN"
-        low, high = float(np.nanmin(array)), float(np.nanmax(array))
-    else:
-        missing, low, high = 0, float(array.min()), float(array.max())
-    span = number(low) if low == high else f"{number(low)} … {number(high)}"
+        return ", ".join(number(value) for value in array.ravel().tolist()) + unit
+    missing = int(np.count_nonzero(np.isnan(array))) if array.dtype.kind == "f" else 0
+    if missing == array.size:
+        return "all NaN"
+    low, high = number(float(np.nanmin(array))), number(float(np.nanmax(array)))
+    span = low + unit if low == high else f"{low} … {high}{unit}"
     return f"{span}; {missing} NaN" if missing else span
 
 

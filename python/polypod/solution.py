@@ -20,8 +20,8 @@ from polypod.passages import find_passages
 from polypod.results import Solution
 from polypod.singularity import Determinant
 from polypod.status import Status
+from polypod.variables import TIME, coords_of, variable
 from polypod.variables import VARIABLES as VARIABLES
-from polypod.variables import coords_of, variable
 
 CHUNK = 20_000
 """States solved between two reports of progress."""
@@ -172,7 +172,7 @@ def dataset_of(
         if 0 not in array.shape[1:]:
             data[name] = (("time", *about.dims), array, about.attributes)
     dims = {dim for of, _, _ in data.values() for dim in of}
-    instants = {"time": ("time", time, {"units": "s", "symbol": "t", "long_name": "time"})}
+    instants = {"time": ("time", time, TIME)}
     source = {
         "mechanism": mech.name,
         "mechanism_file": mech.to_toml(),

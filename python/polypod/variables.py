@@ -58,6 +58,7 @@ def _variables(entries: dict[str, tuple[Any, ...]]) -> dict[str, Variable]:
     return {name: Variable(*entry) for name, entry in entries.items()}
 
 
+TIME = {"units": "s", "symbol": "t", "long_name": "time"}
 STATUS = Variable(_ONE, "", "", "outcome of the state", Status)
 
 # Those of solutions, in their order.
@@ -266,6 +267,11 @@ DIMENSIONS = frozenset(dim for about in (*VARIABLES.values(), *FURTHER.values())
 """Names of all dimensions but those of the states."""
 
 
+def _unit_along(name: str) -> str:
+    """Of a coordinate, or of a component of the platform's motion."""
+    return "m" if name.startswith("linear") else coordinate_unit(name)
+
+
 def constraint_rows(mech: Mechanism) -> list[str]:
     """Names of the independent constraints, such as "A of leg 1"."""
     mobility = mech.mobility()
@@ -280,4 +286,6 @@ def coords_of(mech: Mechanism, dims: set[str], own: Mapping[str, Sequence[Any]])
     coords: dict[str, Any] = labels
     if "limit" in dims:
         coords["limit_unit"] = ("limit", [limit.unit for limit in mech.limit_list])
+    if "coordinate" in dims:
+        coords["coordinate_unit"] = ("coordinate", [_unit_along(name) for name in own["coordinate"]])
     return coords
