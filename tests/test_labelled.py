@@ -270,6 +270,16 @@ def test_legs_are_rows_and_states_are_counted_by_status(lu, poses):
     assert reader.rows[1][1].startswith("0.6")
 
 
+def test_coordinates_are_rows(lu):
+    state = lu.state({"alpha": 0.1, "p": -0.3, "h": [0.6, 0.7], "beta": 0.8, "gamma": 0.6}, {"h": 0.05})
+    rows = read(state).rows
+    assert rows[0] == ["coordinate", "value", "rate", "second rate"]
+    assert ["h / m", "0.6, 0.7", "0.05, 0.05", "0, 0"] in rows
+    assert ["beta / rad", "0.8, 0.8", "0, 0", "0, 0"] in rows
+    assert [row[0] for row in rows[-3:]] == ["pose", "twist", "acceleration"]
+    assert "coordinate_rate_h  " in repr(state)
+
+
 def test_what_has_no_answer_says_so(lu):
     natural = {"alpha": 0.1, "p": -0.3, "h": [np.nan, 0.7], "beta": 0.7, "gamma": 0.6}
     poses = lu.pose(natural)

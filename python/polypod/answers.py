@@ -13,7 +13,8 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from polypod.labelled import Answer, Quantity
+from polypod.labelled import Answer, Quantity, whole_rows
+from polypod.notebook import Rows, numbers
 from polypod.variables import COMPONENTS, variable
 
 Array = NDArray[np.float64]
@@ -53,6 +54,17 @@ class State(Answer):
         columns = {prefix + name: column for prefix, of in series.items() for name, column in of.items()}
         found = super().quantities()
         return found + [Quantity(name, name, variable(name), column) for name, column in columns.items()]
+
+    def _tables(self) -> list[Rows]:
+        """Coordinates as rows."""
+        motion = (self.coordinates, self.coordinate_rates, self.coordinate_second_rates)
+        headers = ("coordinate", "value", "rate", "second rate")
+        rows = []
+        for name in self.coordinates:
+            unit = variable(f"coordinate_{name}").unit
+            values = (numbers(of[name]) if name in of else "" for of in motion)
+            rows.append((f"{name} / {unit}" if unit != "1" else name, *values))
+        return [Rows(headers, rows), whole_rows(super().quantities()[:3])]
 
 
 @dataclass(frozen=True, eq=False, init=False, repr=False)

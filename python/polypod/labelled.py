@@ -174,6 +174,9 @@ class Answer:
     def _repr_html_(self) -> str:
         """For notebooks: states by status, a row for each leg, rod or limit, then everything else."""
         title, said = self._heading()
+        return card(title, said, self._tables())
+
+    def _tables(self) -> list[Rows]:
         quantities = [q for q in self.quantities() if q.name != "status"]
         named = coords_of(self.mech, {dim for q in quantities for dim in q.about.dims}, self.labels())
         tables, told = [], set()
@@ -183,13 +186,13 @@ class Answer:
                 _, units = named.get(f"{dim}_unit", (dim, ["1"] * len(labels)))
                 tables.append(_by_label(dim, labels, units, columns))
                 told |= {q.name for q in columns}
-        rest = [
-            (q.name, q.about.long_name, " × ".join(q.about.dims), q.shown)
-            for q in quantities
-            if q.name not in told
-        ]
-        tables.append(Rows(("", "", "for each", ""), rest, texts=4))
-        return card(title, said, tables)
+        return [*tables, whole_rows([q for q in quantities if q.name not in told])]
+
+
+def whole_rows(quantities: Sequence[Quantity]) -> Rows:
+    """A row for each quantity."""
+    rows = [(q.name, q.about.long_name, " × ".join(q.about.dims), q.shown) for q in quantities]
+    return Rows(("", "", "for each", ""), rows, texts=4)
 
 
 _SHOWN_WHOLE = ("axis", "component")

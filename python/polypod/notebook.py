@@ -24,10 +24,10 @@ _CARD = """\
 {% endfor %}{% if picture %}<img alt="{{ title }}" style="max-width: 22em" \
 src="data:image/png;base64,{{ picture }}">
 {% endif %}{% for table in tables %}<table style="margin: .5em 0; font-variant-numeric: tabular-nums">
-<thead><tr>{% for header in table.headers %}<th style="text-align: \
+<thead><tr>{% for header in table.headers %}<th style="padding: .2em .6em; text-align: \
 {{ 'left' if loop.index <= table.texts else 'right' }}">{{ header }}</th>{% endfor %}</tr></thead>
 <tbody>
-{% for row in table.rows %}<tr>{% for cell in row %}<td style="\
+{% for row in table.rows %}<tr>{% for cell in row %}<td style="padding: .2em .6em; \
 {{ 'text-align: left' if loop.index <= table.texts else 'text-align: right; white-space: nowrap' }}">\
 {{ cell }}</td>{% endfor %}</tr>
 {% endfor %}</tbody></table>
