@@ -95,6 +95,7 @@ def test_every_array_of_an_answer_is_a_quantity(name):
     mech = pp.load(MECHANISMS[name])
     more = [mech.base_parameters()] if mech.conditioning(mech.home).sigma_min > 0 else []
     for answer in (*answers(mech, mech.home[None]), *more):
+        assert vars(answer).keys() == {field.name for field in fields(answer)}
         for field in fields(answer):
             if isinstance(getattr(answer, field.name), np.ndarray):
                 assert field.name in answer._variables, f"{type(answer).__name__}.{field.name}"

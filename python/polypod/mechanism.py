@@ -100,7 +100,12 @@ class Mechanism:
         self._lengths = Arguments(lengths=(len(legs),))
         self._guessed_lengths = Arguments(lengths=(len(legs),), guess=(4, 4))
         self._driven = Arguments(pose=(4, 4), twist=(6,), forces=(len(legs),))
-        self._sets = {name: (tuple(names), given) for name, names, given in self._core.coordinate_sets()}
+        sets = self._core.coordinate_sets()
+        self._sets = {set: tuple(names) for set, names, _ in sets}
+        self._given = {
+            set: tuple(names if given is None else (n for n, g in zip(names, given, strict=True) if g))
+            for set, names, given in sets
+        }
 
     # --- files -------------------------------------------------------------------------------------------
 
@@ -194,10 +199,7 @@ class Mechanism:
     @property
     def coordinate_sets(self) -> dict[str, tuple[str, ...]]:
         """The names that each coordinate set takes; of the set `pose` any `dof` may be given."""
-        return {
-            set: names if given is None else tuple(n for n, g in zip(names, given, strict=True) if g)
-            for set, (names, given) in self._sets.items()
-        }
+        return dict(self._given)
 
     @property
     def coupled_legs(self) -> tuple[str, str] | None:
@@ -309,7 +311,7 @@ class Mechanism:
         if branch not in (-1, +1):
             raise CoordinateError(f"branch is {branch!r}; must be +1 or -1")
         set = self._set_of(coordinates)
-        names, _ = self._sets[set]
+        names = self._sets[set]
         series: list[Mapping[str, ArrayLike]] = [coordinates, rates or {}, second_rates or {}]
         for extra, kind in zip(series[1:], ("rates", "second_rates"), strict=True):
             for name in extra:
@@ -320,9 +322,9 @@ class Mechanism:
         flat = [doubles(name, s.get(name, 0.0)) for name in coordinates for s in series]
         guess_array = None if guess is None else doubles("guess", guess, (4, 4))
         shape = common(*(a.shape for a in flat), () if guess_array is None else guess_array.shape[:-2])
-        columns = iter(spread(a, shape) for a in flat)
-        by_name = {name: [next(columns) for _ in series] for name in coordinates}
-        table = self._core.states(
+        rows = iter(spread(a, shape) for a in flat)
+        by_name = {name: [next(rows) for _ in series] for name in coordinates}
+        out = self._core.states(
             set,
             [by_name.get(name) for name in names],
             shape,
@@ -330,18 +332,9 @@ class Mechanism:
             None if guess_array is None else spread(guess_array, (*shape, 4, 4)),
             continued,
         )
-        out = table
-        split = [
-            dict(zip(names, np.moveaxis(out[key], -1, 0), strict=True))
-            for key in ("coordinates", "coordinate_rates", "coordinate_second_rates")
-        ]
-        return State(
-            self,
-            **{name: out[name] for name in ("pose", "twist", "acceleration", "status")},
-            coordinates=split[0],
-            coordinate_rates=split[1],
-            coordinate_second_rates=split[2],
-        )
+        columns = ("coordinates", "coordinate_rates", "coordinate_second_rates")
+        named: dict[str, Any] = {key: _by_name(names, out[key]) for key in columns}
+        return State(self, **out | named)
 
     def coordinates(self, pose: ArrayLike, set: str | None = None) -> dict[str, Array]:
         """All numbers of a coordinate set at a pose, m and rad: the inverse of `pose`.
@@ -353,22 +346,21 @@ class Mechanism:
             raise UnknownNameError("coordinate set", set, self._sets)
         (poses,) = POSE(pose)
         out = self._core.coordinates(set, poses)
-        return dict(zip(self._sets[set][0], np.moveaxis(out["coordinates"], -1, 0), strict=True))
+        return _by_name(self._sets[set], out["coordinates"])
 
     def _set_of(self, coordinates: Mapping[str, ArrayLike]) -> str:
         """The set whose given names these are."""
         given = {*coordinates}
-        for set, names in self.coordinate_sets.items():
+        for set, names in self._given.items():
             if given == {*names} or (set == "pose" and given <= {*names} and len(given) == self.dof):
                 return set
-        known = sorted({name for names in self.coordinate_sets.values() for name in names})
+        known = sorted({name for names in self._given.values() for name in names})
         unknown = [
             f"{name!r} is none: {alternatives(str(name), known)}" for name in coordinates if name not in known
         ]
         some = "" if self.dof == 6 else f"{self.dof} independent ones of "
         choices = "; ".join(
-            f"{set}: {some if set == 'pose' else ''}{', '.join(names)}"
-            for set, names in self.coordinate_sets.items()
+            f"{set}: {some if set == 'pose' else ''}{', '.join(names)}" for set, names in self._given.items()
         )
         raise CoordinateError(
             f"{self.name} has no coordinate set with {', '.join(map(str, coordinates)) or 'no names'}; "
@@ -514,10 +506,9 @@ class Mechanism:
         if reach is None:
             reach = float(self.inverse_kinematics(self.home).lengths.max())
         (poses,) = POSE(pose)
-        names, table = self._core.nearest_singular(
+        names, out = self._core.nearest_singular(
             poses, set, named, self._length(length), _positive("reach", reach)
         )
-        out = table
         distance = np.abs(out["singular"] - out["value"][..., None])
         named_kind = {"kind": codes(out["kind"])}
         return SingularityDistance(self, coordinates=tuple(names), distance=distance, **out | named_kind)
@@ -535,7 +526,7 @@ class Mechanism:
         ):
             raise CoordinateError(
                 f"coordinates {', '.join(named)} are not those of the set {set}: "
-                f"{', '.join(self.coordinate_sets[set])}, {self.dof} of them"
+                f"{', '.join(self._given[set])}, {self.dof} of them"
             )
         return set, named
 
@@ -803,9 +794,7 @@ class Mechanism:
         """
         args = MOTION.loaded(wrench, wrench_axes, pose, twist, acceleration)
         args = (*args, self._length(length))
-        out = self._core.joint_reactions(*args)
-        marks = {name: out[name] == 1.0 for name in ("determinate", "determinate_in_joint")}
-        return JointReactions(self, joints=self.joint_list, **out | marks)
+        return JointReactions(self, joints=self.joint_list, **self._core.joint_reactions(*args))
 
     def forward_dynamics(
         self,
@@ -873,8 +862,8 @@ class Mechanism:
                 "the coordinates of the set tool are not independent: only the direction of the axis counts; "
                 f"take one of {', '.join(name for name in self._sets if name != 'tool')}"
             )
-        found, table = self._core.equations_of_motion(poses, twists, set, names)
-        return EquationsOfMotion(self, coordinates=tuple(found), **table)
+        found, out = self._core.equations_of_motion(poses, twists, set, names)
+        return EquationsOfMotion(self, coordinates=tuple(found), **out)
 
     def power(
         self,
@@ -998,12 +987,11 @@ class Mechanism:
         set, named = self._varied_coordinates(set, coordinates)
         args = MOTION.loaded(wrench, wrench_axes, pose, twist, acceleration)
         args = (*args, set, named)
-        names, table = _core.inverse_dynamics_derivatives(self._core, *args)
+        names, out = _core.inverse_dynamics_derivatives(self._core, *args)
         _, bodies, _ = _core.inertial_parameters(self._core)
         geometry = _core.geometry_parameters(self._core)
-        arrays = table
         return InverseDynamicsDerivatives(
-            self, coordinates=tuple(names), bodies=tuple(bodies), geometry=tuple(geometry), **arrays
+            self, coordinates=tuple(names), bodies=tuple(bodies), geometry=tuple(geometry), **out
         )
 
     def regressor(
@@ -1108,17 +1096,7 @@ class Mechanism:
         else:
             twist, acceleration = (np.zeros(6) if a is None else a for a in (twist, acceleration))
             args = MOTION.loaded(wrench, wrench_axes, pose, twist, acceleration)
-        out = self._core.limits(*args)
-        binding = out["binding"]
-        return Limits(
-            self,
-            names=self._limit_names,
-            margins=out["margins"],
-            relative=out["relative"],
-            binding=np.where(np.isnan(binding), -1, binding).astype(np.int64),
-            within=out["within"] == 1.0,
-            status=out["status"],
-        )
+        return Limits(self, names=self._limit_names, **self._core.limits(*args))
 
     def coupled_forces(
         self, pose: ArrayLike, constraint: ArrayLike, *, as_printed: bool = False
@@ -1139,6 +1117,11 @@ class Mechanism:
             raise CoordinateError(f"{self.name} has no two legs that share a constraint on one rod")
         first, second = result[0]
         return CoupledForces(self, legs=(self.leg_names[first], self.leg_names[second]), **result[1])
+
+
+def _by_name(names: Sequence[str], rows: Array) -> dict[str, Array]:
+    """The last axis by names; numbers for a single state."""
+    return {name: rows[..., i][()] for i, name in enumerate(names)}
 
 
 def _plain(value: Any) -> Any:

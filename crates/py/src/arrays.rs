@@ -81,12 +81,33 @@ fn array<'py, T: numpy::Element + Copy>(
 
 /// Arrays by name and their status, with the axes of the batch before those of a state.
 pub fn arrays<'py>(py: Python<'py>, table: Table, batch: &[usize]) -> PyResult<Bound<'py, PyDict>> {
+    arrays_but(py, table, batch, [], [])
+}
+
+/// The same, where these fields are marks (1 for true) and those are whole numbers (-1 where there is none).
+pub fn arrays_but<'py, const M: usize, const W: usize>(
+    py: Python<'py>,
+    table: Table,
+    batch: &[usize],
+    marks: [&str; M],
+    whole: [&str; W],
+) -> PyResult<Bound<'py, PyDict>> {
     let result = PyDict::new(py);
     for field in table.fields {
         let shape = [batch, &field.shape].concat();
-        result.set_item(PyString::intern(py, field.name), array(py, field.data, &shape)?)?;
+        let (name, data) = (PyString::intern(py, field.name), field.data.into_iter());
+        // Vectors are changed in place.
+        if marks.contains(&field.name) {
+            result.set_item(name, array(py, data.map(|x| x == 1.0).collect(), &shape)?)?;
+        } else if whole.contains(&field.name) {
+            #[allow(clippy::cast_possible_truncation)]
+            let number = |x: f64| if x.is_nan() { -1 } else { x as i64 };
+            result.set_item(name, array(py, data.map(number).collect(), &shape)?)?;
+        } else {
+            result.set_item(name, array(py, data.collect(), &shape)?)?;
+        }
     }
-    let status = table.status.iter().map(|&s| s as u8).collect();
+    let status = table.status.into_iter().map(|s| s as u8).collect();
     result.set_item(PyString::intern(py, "status"), array(py, status, batch)?)?;
     Ok(result)
 }

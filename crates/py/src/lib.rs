@@ -10,7 +10,7 @@ mod workspace;
 
 use std::sync::OnceLock;
 
-use arrays::{Array, PyAxes, arrays, batch_of, slice};
+use arrays::{Array, PyAxes, arrays, arrays_but, batch_of, slice};
 use numpy::{PyArray1, PyArrayMethods};
 use polypod_core::assembly::assemble;
 use polypod_core::batch::{self, Coordinates, Loads, Space, States, Table};
@@ -380,8 +380,11 @@ impl PyMechanism {
         wrenches: Option<Array<'py>>,
         platform_axes: bool,
     ) -> PyResult<Bound<'py, PyDict>> {
-        let motion = [&poses, &twists, &accelerations];
-        self.loaded(py, motion, wrenches.as_ref(), platform_axes, batch::limits)
+        let batch = batch_of(&poses, 2);
+        let states = states(&poses, &twists, &accelerations)?;
+        let loads = loads(wrenches.as_ref(), platform_axes, states.poses)?;
+        let table = py.detach(|| batch::limits(&self.0, &states, &loads));
+        arrays_but(py, table, &batch, ["within"], ["binding"])
     }
 
     #[pyo3(signature = (poses, twists, accelerations, wrenches, platform_axes, length))]
@@ -400,7 +403,7 @@ impl PyMechanism {
         let states = states(&poses, &twists, &accelerations)?;
         let loads = loads(wrenches.as_ref(), platform_axes, states.poses)?;
         let table = py.detach(|| batch::joint_reactions(&self.0, &states, &loads, length));
-        arrays(py, table, &batch)
+        arrays_but(py, table, &batch, ["determinate", "determinate_in_joint"], [])
     }
 
     /// Name, kind and links (towards the base, away from it) of each joint.
