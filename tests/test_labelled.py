@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 import html.parser
 import pickle
-from dataclasses import FrozenInstanceError, fields, replace
+from dataclasses import fields, replace
 from pathlib import Path
 
 import numpy as np
@@ -191,10 +191,8 @@ def test_coordinates_have_unit_and_symbol():
 # --- objects ------------------------------------------------------------------------------------------------
 
 
-def test_an_answer_is_not_changed_but_replaced(lu, poses):
+def test_an_answer_is_replaced(lu, poses):
     answer = lu.inverse_kinematics(poses)
-    with pytest.raises(FrozenInstanceError):
-        answer.lengths = 1.0
     longer = replace(answer, lengths=2 * answer.lengths)
     assert longer.mech is lu
     assert np.array_equal(longer.lengths, 2 * answer.lengths)

@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 Codes = NDArray[np.uint8]
 
 
-@dataclass(frozen=True, eq=False, init=False, repr=False)
+@dataclass(eq=False, repr=False)
 class State(Answer):
     """A platform's motion, and all numbers of its coordinate set."""
 
@@ -67,7 +67,7 @@ class State(Answer):
         return [Rows(headers, rows), whole_rows(super().quantities()[:3])]
 
 
-@dataclass(frozen=True, eq=False, init=False, repr=False)
+@dataclass(eq=False, repr=False)
 class InverseKinematics(Answer):
     """Legs at a pose [Eq. 3]."""
 
@@ -87,7 +87,7 @@ class InverseKinematics(Answer):
     }
 
 
-@dataclass(frozen=True, eq=False, init=False, repr=False)
+@dataclass(eq=False, repr=False)
 class ForwardKinematics(Answer):
     """The platform for given leg lengths [T25-T27]."""
 
@@ -107,7 +107,7 @@ class ForwardKinematics(Answer):
     }
 
 
-@dataclass(frozen=True, eq=False, init=False, repr=False)
+@dataclass(eq=False, repr=False)
 class AssemblyModes(Answer):
     """All real poses for given leg lengths, highest first [T28]; NaN beyond `number`."""
 
@@ -144,7 +144,7 @@ class AssemblyModes(Answer):
         return {"mode": range(1, self.pose.shape[-3] + 1)}
 
 
-@dataclass(frozen=True, eq=False, init=False, repr=False)
+@dataclass(eq=False, repr=False)
 class Kinematics(Answer):
     """Motion of legs, rods, links and joints [Eq. 2-39], base axes, SI."""
 
@@ -219,7 +219,7 @@ class Kinematics(Answer):
     }
 
 
-@dataclass(frozen=True, eq=False, init=False, repr=False)
+@dataclass(eq=False, repr=False)
 class InverseDynamics(Answer):
     """What balances a motion [Eq. 43]."""
 
@@ -236,7 +236,7 @@ class InverseDynamics(Answer):
     }
 
 
-@dataclass(frozen=True, eq=False, init=False, repr=False)
+@dataclass(eq=False, repr=False)
 class ForwardDynamics(Answer):
     """What forces do to the platform [T49]."""
 
@@ -254,7 +254,7 @@ class ForwardDynamics(Answer):
     }
 
 
-@dataclass(frozen=True, eq=False, init=False, repr=False)
+@dataclass(eq=False, repr=False)
 class EquationsOfMotion(Answer):
     """The terms of M q'' + C q' + D q' + g = Jᵀ f + Sᵀ W/η in d velocities q' of the platform [T49-T52].
 
@@ -298,7 +298,7 @@ class EquationsOfMotion(Answer):
         return {"coordinate": names, "by_coordinate": names}
 
 
-@dataclass(frozen=True, eq=False, init=False, repr=False)
+@dataclass(eq=False, repr=False)
 class CoupledForces(Answer):
     """Forces of two legs on one rod, and the torque on the rod [T16]."""
 
@@ -335,7 +335,7 @@ class Joint:
     """The link on the base's side, which acts, and that on the platform's, which is acted on."""
 
 
-@dataclass(frozen=True, eq=False, init=False, repr=False)
+@dataclass(eq=False, repr=False)
 class JointReactions(Answer):
     """What joints do to links [T44-T48]; j joints: rods first, then each leg's from base to platform.
 
@@ -387,7 +387,7 @@ class JointReactions(Answer):
     }
 
 
-@dataclass(frozen=True, eq=False, init=False, repr=False)
+@dataclass(eq=False, repr=False)
 class Power(Answer):
     """Energies and powers of a motion [T17]; W and J."""
 
@@ -425,7 +425,7 @@ class Power(Answer):
     }
 
 
-@dataclass(frozen=True, eq=False, init=False, repr=False)
+@dataclass(eq=False, repr=False)
 class Conditioning(Answer):
     """Singular values of the leg Jacobian on the twists that the constraints allow [T24]; pure numbers."""
 
@@ -445,7 +445,7 @@ class Conditioning(Answer):
     }
 
 
-@dataclass(frozen=True, eq=False, init=False, repr=False)
+@dataclass(eq=False, repr=False)
 class Limits(Answer):
     """How far states are from the limits of their mechanism [T35]; m limits in the order of `limit_list`."""
 

@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 Codes = NDArray[np.uint8]
 
 
-@dataclass(frozen=True, eq=False, init=False, repr=False)
+@dataclass(eq=False, repr=False)
 class InverseDynamicsDerivatives(Answer):
     """Exact derivatives of active forces and multipliers [T56, T57]; the last axis is what is varied.
 
@@ -111,7 +111,7 @@ class InverseDynamicsDerivatives(Answer):
         }
 
 
-@dataclass(frozen=True, eq=False, init=False, repr=False)
+@dataclass(eq=False, repr=False)
 class Regressor(Answer):
     """Active forces and multipliers as linear functions of the inertial parameters [T57].
 
@@ -149,7 +149,7 @@ class Regressor(Answer):
         return {"parameter": self.names}
 
 
-@dataclass(frozen=True, eq=False, init=False, repr=False)
+@dataclass(eq=False, repr=False)
 class BaseParameters(Answer):
     """The minimal set of inertial parameters: combinations that active forces can tell apart [T58].
 

@@ -63,7 +63,7 @@ class Quantity(NamedTuple):
         return f"{self.name} {symbol}".rstrip() + (f" / {unit}" if unit not in ("", "1") else "")
 
 
-@dataclass(frozen=True, eq=False, init=False, repr=False)
+@dataclass(eq=False, repr=False)
 class Answer:
     """Named arrays over a batch of states: what a mechanism answers.
 
@@ -77,10 +77,6 @@ class Answer:
     """Array → its quantity, a name of `polypod.variables`."""
     _same_for_all: ClassVar[frozenset[str]] = frozenset()
     """Arrays that do not have the leading axes of the batch."""
-
-    def __init__(self, mech: Mechanism, **values: Any) -> None:
-        # A controller has one made at every step: this takes a third of a frozen dataclass's own time.
-        vars(self).update(values, mech=mech)
 
     @property
     def batch(self) -> tuple[int, ...]:

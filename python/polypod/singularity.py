@@ -23,7 +23,7 @@ NEAR_SINGULAR = 0.01
 """Smallest singular value (a pure number) below which a pose is called nearly singular."""
 
 
-@dataclass(frozen=True, eq=False, init=False, repr=False)
+@dataclass(eq=False, repr=False)
 class Singularity(Answer):
     """How near poses are to singularities, and to which kind [T24, T30-T33]; base axes.
 
@@ -84,7 +84,7 @@ class Singularity(Answer):
     }
 
 
-@dataclass(frozen=True, eq=False, init=False, repr=False)
+@dataclass(eq=False, repr=False)
 class Determinant(Answer):
     """det J in pure numbers along a motion [T30]."""
 
@@ -101,7 +101,7 @@ class Determinant(Answer):
     }
 
 
-@dataclass(frozen=True, eq=False, init=False, repr=False)
+@dataclass(eq=False, repr=False)
 class SingularityDistance(Answer):
     """How far each coordinate goes, the others kept, until det J is zero [T34]; m and rad."""
 
