@@ -23,7 +23,9 @@ from polypod.errors import PolypodError, ShapeError
 from polypod.mechanism import Mechanism
 from polypod.results import Solution
 from polypod.scene import Scene, draw, frame, joint_handles, math_name
-from polypod.series import Panel, draw_panel, in_kilo, pyplot_figure, stroke_of
+from polypod.series import Panel as Panel
+from polypod.series import draw_panel, pyplot_figure, stroke_of
+from polypod.series import in_kilo as in_kilo
 from polypod.series import plot_series as plot_series
 from polypod.status import Status, count
 from polypod.style import BLUE, GREY, INK, house_style
@@ -151,7 +153,7 @@ def plot_fig4(solution: Solution, figure: Figure | None = None) -> Figure:
     as zero.
     """
     data = solution.dataset
-    panels = [panel for panel in _panels(data) if panel is not None]
+    panels = fig4_panels(data)
     columns = 3
     rows = -(-len(panels) // columns)
     with house_style():
@@ -183,7 +185,8 @@ def plot_fig4(solution: Solution, figure: Figure | None = None) -> Figure:
     return figure
 
 
-def _panels(data: xr.Dataset) -> list[Panel | None]:
+def fig4_panels(data: xr.Dataset) -> list[Panel]:
+    """The panels of the paper's Fig. 4 in its order: platform, legs, forces; see `plot_fig4`."""
     legs = [math_name(str(name)) for name in data["leg"].to_numpy()]
 
     def six(name: str, part: int, label: str, symbol: str, unit: str, scale: float = 1.0) -> Panel:
@@ -197,7 +200,7 @@ def _panels(data: xr.Dataset) -> list[Panel | None]:
 
     position = 1e3 * data["pose"].to_numpy()[:, :3, 3]
     forces = of_legs("force", "active force $f_a$", "f_{a#}", "N")
-    return [
+    panels = [
         Panel("position of $o$", "mm", position, ("$X_o$", "$Y_o$", "$Z_o$")),
         six("twist", 0, "velocity $v$", "v", "mm s$^{-1}$", 1e3),
         six("acceleration", 0, "acceleration $a$", "a", "mm s$^{-2}$", 1e3),
@@ -211,6 +214,7 @@ def _panels(data: xr.Dataset) -> list[Panel | None]:
         _second_forces(data),
         _torque(data),
     ]
+    return [panel for panel in panels if panel is not None]
 
 
 def _orientation(data: xr.Dataset) -> Panel | None:

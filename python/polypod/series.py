@@ -28,7 +28,7 @@ _SHOWN_IN = {"m": (1e3, "mm"), "m/s": (1e3, "mm/s"), "m/s^2": (1e3, "mm/s^2"), "
 
 @dataclass(frozen=True)
 class Panel:
-    """Curves over time in one unit, as they are drawn."""
+    """Curves over time in one unit, as they are drawn; texts as matplotlib takes them, with $formulas$."""
 
     label: str
     unit: str
