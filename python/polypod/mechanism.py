@@ -149,6 +149,11 @@ class Mechanism:
     def __repr__(self) -> str:
         return f"<Mechanism {self.name}: {'+'.join(self.leg_letters)}, {self.dof} freedoms>"
 
+    def _repr_html_(self) -> str:
+        from polypod.cards import of_mechanism
+
+        return of_mechanism(self)
+
     # --- what it is --------------------------------------------------------------------------------------
 
     @property
@@ -329,7 +334,7 @@ class Mechanism:
         )
         columns = ("coordinates", "coordinate_rates", "coordinate_second_rates")
         named: dict[str, Any] = {key: _by_name(names, out[key]) for key in columns}
-        return State(**out | named)
+        return State(self, **out | named)
 
     def coordinates(self, pose: ArrayLike, set: str | None = None) -> dict[str, Array]:
         """All numbers of a coordinate set at a pose, m and rad: the inverse of `pose`.
@@ -373,7 +378,7 @@ class Mechanism:
         [0.7487, 0.7441, 0.7487, 0.7544, 0.7544]
         """
         (poses,) = POSE(pose)
-        return InverseKinematics(**self._core.inverse_kinematics(poses))
+        return InverseKinematics(self, **self._core.inverse_kinematics(poses))
 
     def jacobian(self, pose: ArrayLike) -> Array:
         """(..., 6, 6): J of `J V = (ℓ', 0)`: actuated legs, then independent constraints [Eq. 13].
@@ -397,7 +402,7 @@ class Mechanism:
         A twist or acceleration that breaks a constraint has the status OFF_CONSTRAINT and no numbers.
         """
         states = MOTION(pose, twist, acceleration)
-        return Kinematics(**self._core.kinematics(*states))
+        return Kinematics(self, **self._core.kinematics(*states))
 
     def platform_twist(self, pose: ArrayLike, rates: ArrayLike) -> tuple[Array, Codes]:
         """The twist (..., 6) that gives the legs these rates (..., n), m/s, and the status [Eq. 13]."""
@@ -423,7 +428,7 @@ class Mechanism:
         `characteristic_length`.
         """
         (poses,) = POSE(pose)
-        return Conditioning(**self._core.conditioning(poses, self._length(length)))
+        return Conditioning(self, **self._core.conditioning(poses, self._length(length)))
 
     def determinant(
         self, pose: ArrayLike, twist: ArrayLike = (0.0,) * 6, *, length: float | None = None
@@ -436,7 +441,7 @@ class Mechanism:
             length: what turns are counted with, m; `characteristic_length` by default.
         """
         poses, twists = MOVING(pose, twist)
-        return Determinant(**self._core.determinant(poses, twists, self._length(length)))
+        return Determinant(self, **self._core.determinant(poses, twists, self._length(length)))
 
     def singularity(
         self, pose: ArrayLike, *, length: float | None = None, tolerance: float = TOLERANCE
@@ -463,7 +468,7 @@ class Mechanism:
             raise PolypodError(f"tolerance is {tolerance!r}; must be zero or more")
         (poses,) = POSE(pose)
         out = self._core.singularity(poses, self._length(length), float(tolerance))
-        return Singularity(**out | {name: codes(out[name]) for name in ("kind", "leg", "uncontrolled")})
+        return Singularity(self, **out | {name: codes(out[name]) for name in ("kind", "leg", "uncontrolled")})
 
     def singularity_distance(
         self,
@@ -504,15 +509,9 @@ class Mechanism:
         names, out = self._core.nearest_singular(
             poses, set, named, self._length(length), _positive("reach", reach)
         )
-        return SingularityDistance(
-            tuple(names),
-            out["value"],
-            out["singular"],
-            np.abs(out["singular"] - out["value"][..., None]),
-            codes(out["kind"]),
-            out["searched"],
-            out["status"],
-        )
+        distance = np.abs(out["singular"] - out["value"][..., None])
+        named_kind = {"kind": codes(out["kind"])}
+        return SingularityDistance(self, coordinates=tuple(names), distance=distance, **out | named_kind)
 
     def _varied_coordinates(
         self, set: str | None, coordinates: Sequence[str] | None
@@ -567,7 +566,7 @@ class Mechanism:
             (lengths,), guesses = self._lengths(lengths), None
         else:
             lengths, guesses = self._guessed_lengths(lengths, guess)
-        return ForwardKinematics(**self._core.forward_kinematics(lengths, guesses, continued))
+        return ForwardKinematics(self, **self._core.forward_kinematics(lengths, guesses, continued))
 
     def assembly_modes(self, lengths: ArrayLike) -> AssemblyModes:
         """All real poses with the given leg lengths [T28, T29].
@@ -605,7 +604,7 @@ class Mechanism:
         padded["mode_status"] = padded.pop("status")
         batch = lengths.shape[:-1]
         modes = {name: a.reshape(batch + a.shape[1:]) for name, a in padded.items()}
-        return AssemblyModes(**modes, number=count.reshape(batch), status=status.reshape(batch))
+        return AssemblyModes(self, **modes, number=count.reshape(batch), status=status.reshape(batch))
 
     # --- workspace ---------------------------------------------------------------------------------------
 
@@ -749,7 +748,7 @@ class Mechanism:
         [-13151.0, 9809.0, -4907.0, -1993.0, 10231.0]
         """
         args = MOTION.loaded(wrench, wrench_axes, pose, twist, acceleration)
-        return InverseDynamics(**self._core.inverse_dynamics(*args))
+        return InverseDynamics(self, **self._core.inverse_dynamics(*args))
 
     @cached_property
     def joint_list(self) -> tuple[Joint, ...]:
@@ -795,7 +794,7 @@ class Mechanism:
         """
         args = MOTION.loaded(wrench, wrench_axes, pose, twist, acceleration)
         args = (*args, self._length(length))
-        return JointReactions(self.joint_list, **self._core.joint_reactions(*args))
+        return JointReactions(self, joints=self.joint_list, **self._core.joint_reactions(*args))
 
     def forward_dynamics(
         self,
@@ -826,7 +825,7 @@ class Mechanism:
         True
         """
         args = self._driven.loaded(wrench, wrench_axes, pose, twist, forces)
-        return ForwardDynamics(**self._core.forward_dynamics(*args))
+        return ForwardDynamics(self, **self._core.forward_dynamics(*args))
 
     def equations_of_motion(
         self, pose: ArrayLike, twist: ArrayLike, coordinates: str | Sequence[str] | None = None
@@ -864,7 +863,7 @@ class Mechanism:
                 f"take one of {', '.join(name for name in self._sets if name != 'tool')}"
             )
         found, out = self._core.equations_of_motion(poses, twists, set, names)
-        return EquationsOfMotion(coordinates=tuple(found), **out)
+        return EquationsOfMotion(self, coordinates=tuple(found), **out)
 
     def power(
         self,
@@ -876,7 +875,7 @@ class Mechanism:
     ) -> Power:
         """Energies and every power of their balance [T17]. Arguments as for `inverse_dynamics`."""
         args = MOTION.loaded(wrench, wrench_axes, pose, twist, acceleration)
-        return Power(**self._core.power(*args))
+        return Power(self, **self._core.power(*args))
 
     def simulate(
         self,
@@ -991,7 +990,9 @@ class Mechanism:
         names, out = _core.inverse_dynamics_derivatives(self._core, *args)
         _, bodies, _ = _core.inertial_parameters(self._core)
         geometry = _core.geometry_parameters(self._core)
-        return InverseDynamicsDerivatives(tuple(names), tuple(bodies), tuple(geometry), **out)
+        return InverseDynamicsDerivatives(
+            self, coordinates=tuple(names), bodies=tuple(bodies), geometry=tuple(geometry), **out
+        )
 
     def regressor(
         self,
@@ -1015,7 +1016,7 @@ class Mechanism:
         args = MOTION.loaded(wrench, wrench_axes, pose, twist, acceleration)
         out = _core.regressor(self._core, *args)
         names, _, values = _core.inertial_parameters(self._core)
-        return Regressor(tuple(names), values, **out)
+        return Regressor(self, names=tuple(names), values=values, **out)
 
     def base_parameters(self) -> BaseParameters:
         """The minimal set of inertial parameters, those combinations that active forces can tell apart [T58].
@@ -1042,12 +1043,13 @@ class Mechanism:
         columns, combination, remainders = found
         names, _, values = _core.inertial_parameters(self._core)
         return BaseParameters(
-            tuple(names[i] for i in columns),
-            np.array(columns, dtype=np.int64),
-            combination,
-            combination @ values,
-            tuple(names),
-            remainders,
+            self,
+            names=tuple(names[i] for i in columns),
+            columns=np.array(columns, dtype=np.int64),
+            combination=combination,
+            values=combination @ values,
+            parameters=tuple(names),
+            remainders=remainders,
         )
 
     # --- limits ------------------------------------------------------------------------------------------
@@ -1094,7 +1096,7 @@ class Mechanism:
         else:
             twist, acceleration = (np.zeros(6) if a is None else a for a in (twist, acceleration))
             args = MOTION.loaded(wrench, wrench_axes, pose, twist, acceleration)
-        return Limits(self._limit_names, **self._core.limits(*args))
+        return Limits(self, names=self._limit_names, **self._core.limits(*args))
 
     def coupled_forces(
         self, pose: ArrayLike, constraint: ArrayLike, *, as_printed: bool = False
@@ -1114,7 +1116,7 @@ class Mechanism:
         if result is None:
             raise CoordinateError(f"{self.name} has no two legs that share a constraint on one rod")
         first, second = result[0]
-        return CoupledForces((self.leg_names[first], self.leg_names[second]), **result[1])
+        return CoupledForces(self, legs=(self.leg_names[first], self.leg_names[second]), **result[1])
 
 
 def _by_name(names: Sequence[str], rows: Array) -> dict[str, Array]:
