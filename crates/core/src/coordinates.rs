@@ -5,7 +5,7 @@
 //! place with trigonometry.
 
 use crate::constraint;
-use crate::lanes::{Lanes, WIDTH};
+use crate::lanes::{Lanes, any};
 use crate::linear::solve;
 use crate::mechanism::{Constraint, ConstraintKind, MAX_CONSTRAINTS, Mechanism};
 use crate::mobility::count;
@@ -600,17 +600,6 @@ pub fn solve_dependent<V: Lanes>(
         q[i] = Jet::select(wanted, found, unsolved[i]);
     }
     ([(arrived, Status::NotConverged), (regular, Status::Fold)], sign)
-}
-
-/// Whether it is more than zero in any lane.
-#[inline(always)]
-fn any<V: Lanes>(x: V) -> bool {
-    let (mut row, mut sum) = ([0.0; WIDTH], 0.0);
-    x.store(&mut row);
-    for x in row {
-        sum += x;
-    }
-    sum > 0.0
 }
 
 /// The largest entry's size; NaN if one is.

@@ -60,6 +60,17 @@ pub trait Lanes: Ordered {
     }
 }
 
+/// Whether it is more than zero in any lane.
+#[inline(always)]
+pub(crate) fn any<V: Lanes>(x: V) -> bool {
+    let (mut row, mut sum) = ([0.0; WIDTH], 0.0);
+    x.store(&mut row);
+    for x in row {
+        sum += x;
+    }
+    sum > 0.0
+}
+
 /// The register of a processor without vectors.
 impl Lanes for f64 {
     const WIDTH: usize = 1;
