@@ -169,7 +169,7 @@ impl<T: Real> Given<T> {
             ];
             for (r, rod) in mech.rods.iter().enumerate() {
                 if rod.leader == i {
-                    self.rods[r] = rod_wrench(mech, rod, &state);
+                    self.rods[r] = rod_wrench(mech, rod, &rod.body, &state);
                 }
             }
         }

@@ -64,14 +64,23 @@ struct LegBalance<V> {
 
 impl<V: Lanes> LegBalance<V> {
     fn new(joints: &[Joint], first: usize) -> Self {
-        let mut free: Vec<_> =
-            joints.iter().enumerate().flat_map(|(j, joint)| joint.free.iter().map(move |&k| (j, k))).collect();
+        let mut free: Vec<_> = joints
+            .iter()
+            .enumerate()
+            .flat_map(|(j, joint)| joint.free.iter().map(move |&k| (j, k)))
+            .collect();
         if joints[0].kind == JointKind::Spherical.letter() && joints[2].kind == joints[0].kind {
             // Turning about itself is free at either end, and is one motion: neither end can hold it.
             free.retain(|&at| at != (0, 4));
         }
         let carried = vec![Wrench::zero(); 6 - free.len()];
-        LegBalance { system: Orthogonal::new(free.len(), 6), free, first, particular: Wrench::zero(), carried }
+        LegBalance {
+            system: Orthogonal::new(free.len(), 6),
+            free,
+            first,
+            particular: Wrench::zero(),
+            carried,
+        }
     }
 
     /// A joint carries nothing where it is free: no power along its motion there, seen at b \[T44\].
@@ -79,7 +88,8 @@ impl<V: Lanes> LegBalance<V> {
     fn solve(&mut self, places: &[Place<V>], [cylinder, piston]: [Wrench<V>; 2], length: f64) {
         let end = places[2].point;
         let zero = Wrench::zero();
-        let given = [pure(piston.moved(end - places[0].point) + cylinder, length), pure(piston, length), zero];
+        let given =
+            [pure(piston.moved(end - places[0].point) + cylinder, length), pure(piston, length), zero];
         let mut rhs = [V::zero(); 6];
         for row in 0..self.free.len() {
             let (j, k) = self.free[row];

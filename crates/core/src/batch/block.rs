@@ -202,6 +202,16 @@ impl<const N: usize> Answers<'_, N> {
             values[k].store(&mut rows[k].0[self.lane..]);
         }
     }
+
+    /// Keeps what has been written in the field where it is `known`: elsewhere it becomes NaN.
+    #[inline(always)]
+    pub(super) fn keep<V: Lanes>(&mut self, field: FieldId, known: V::Mask) {
+        let end = self.starts.get(field.0 + 1).map_or(self.rows.len(), |&start| start);
+        for row in &mut self.rows[self.starts[field.0]..end] {
+            let numbers = &mut row.0[self.lane..];
+            V::select(known, V::load(numbers), V::lit(f64::NAN)).store(numbers);
+        }
+    }
 }
 
 /// The answers for all states.
