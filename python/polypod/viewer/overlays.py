@@ -156,7 +156,9 @@ class Overlays:
             texts.append(text)
             x, y, _ = np.add(shift, mesh.bounds.mean(axis=0))
             above = (float(x), float(y), float(mesh.bounds[1, 2]) + 0.2 * mech.characteristic_length)
-            self._modes.append(self._server.scene.add_label(f"/modes/name {k}", text, position=above))
+            self._modes.append(
+                self._server.scene.add_label(f"/modes/name {k}", f"mode {k + 1}", position=above)
+            )
         self._step_back(1.3 * sum(widths), depth)
         self._go.options = ("–", *texts)
         self._go.visible = self._away.visible = count > 0
