@@ -59,9 +59,11 @@ class Scene:
         platform = base + legs.vectors
         home_platform = base + mech.inverse_kinematics(mech.home).vectors
         stroke, home_lengths = mech.stroke, mech.inverse_kinematics(mech.home).lengths
-        up = _plate_normal(base, home_platform.mean(axis=0) - base.mean(axis=0))
+        # Of a planar mechanism, whose joints lie in one plane, the base is below and the platform above.
+        above = 1e-6 * self._size * np.array([0.0, 0.0, 1.0])
+        up = _plate_normal(base, home_platform.mean(axis=0) - base.mean(axis=0) + above)
         local = np.array([leg["platform"]["point"] for leg in spec["legs"]])
-        base_at_home = (base.mean(axis=0) - mech.home[:3, 3]) @ mech.home[:3, :3]
+        base_at_home = (base.mean(axis=0) - mech.home[:3, 3] - above) @ mech.home[:3, :3]
         down = self._rotation @ _plate_normal(local, base_at_home - local.mean(axis=0))
         radii = [leg["radius"] or 0.085 * self._size for leg in spec["legs"]]
         thick = max(radii)
