@@ -17,8 +17,9 @@ from scipy.optimize import brentq
 
 from polypod import _core
 from polypod.answers import ForwardDynamics, State
+from polypod.arrays import check_wrench_axes
 from polypod.errors import PolypodError, ShapeError, UnknownNameError
-from polypod.mechanism import Mechanism, check_wrench_axes
+from polypod.mechanism import Mechanism
 from polypod.passages import sampled_passages
 from polypod.results import Solution
 from polypod.singularity import Determinant

@@ -11,8 +11,9 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from polypod.arrays import check_wrench_axes
 from polypod.errors import MissingEngineError, PolypodError, ShapeError, UnknownNameError
-from polypod.mechanism import Mechanism, check_wrench_axes
+from polypod.mechanism import Mechanism
 from polypod.motion import Motion
 from polypod.solution import states_along
 from polypod.status import Status

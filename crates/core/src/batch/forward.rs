@@ -34,16 +34,21 @@ pub fn forward_kinematics(
     let asked = |i: usize| actuated_values(mech, lengths, i);
     if !continued {
         return block::in_pieces(n, fields, IN_LANES, |rows, piece| {
-            let valid = |i: usize| {
-                let guess = guess(i);
-                rows.set_status(i, Status::InvalidInput);
-                Some((i, guess?))
-            };
-            let states: Vec<(usize, Pose<f64>)> = piece.filter_map(valid).collect();
-            for states in states.chunks(WIDTH) {
-                let asked: Vec<_> = states.iter().map(|&(i, guess)| (asked(i), guess)).collect();
-                for (&(i, _), found) in states.iter().zip(forward_kinematics_of(mech, &asked)) {
-                    put_found(mech, rows, i, &found);
+            let (mut states, mut numbers) = (Vec::with_capacity(WIDTH), Vec::with_capacity(WIDTH));
+            let last = piece.end;
+            for i in piece {
+                match guess(i) {
+                    None => rows.set_status(i, Status::InvalidInput),
+                    Some(guess) => {
+                        states.push((asked(i), guess));
+                        numbers.push(i);
+                    }
+                }
+                if states.len() == WIDTH || i + 1 == last {
+                    for (i, found) in numbers.drain(..).zip(forward_kinematics_of(mech, &states)) {
+                        put_found(mech, rows, i, &found);
+                    }
+                    states.clear();
                 }
             }
         });
