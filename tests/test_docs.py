@@ -65,7 +65,7 @@ def empty_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 @pytest.mark.parametrize("page", pages_with("python", *SHELLS), ids=short)
 def test_pages_run(page: Path, empty_folder: Path) -> None:
-    if page.stem == "verification" and find_spec("pinocchio") is None:
+    if page.stem in ("engines", "verification") and find_spec("pinocchio") is None:
         pytest.skip("needs pinocchio")
     run_page(page, empty_folder)
 
