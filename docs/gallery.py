@@ -27,7 +27,7 @@ Array = NDArray[np.float64]
 DOCS = Path(__file__).parent
 IMAGES = DOCS / "images" / "gallery"
 MECHANISMS = DOCS / "mechanisms"
-DOTS = 150
+DOTS = 130
 """Per inch."""
 
 SHADES = LinearSegmentedColormap.from_list("shades", ["#12303F", BLUE, SKY, "#D9EEF9", "white"])
