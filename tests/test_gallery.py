@@ -27,14 +27,16 @@ QUICK = {"actuators", "head", "head-tilts", "slice-of-positions", "topology"}
 MOST_BYTES = 3_000_000
 """Of all pictures together: everyone who fetches the source fetches them."""
 
-DIFFERENCE = 0.02
-"""Mean difference of grey, of 1, that another version of the drawing library may make; a curve that moves or
-a panel that is missing makes more."""
+DIFFERENCE = 0.15
+"""Greatest difference of grey, of 1, between small pictures: of letters that are set a little otherwise.
+
+A curve that moves or is missing makes more.
+"""
 
 
 def grey(path: Path) -> np.ndarray:
     """The picture, so small that letters do not matter."""
-    return np.asarray(Image.open(path).convert("L").resize((96, 96)), dtype=float) / 255.0
+    return np.asarray(Image.open(path).convert("L").resize((64, 64)), dtype=float) / 255.0
 
 
 def test_quick_ones_exist() -> None:
@@ -48,7 +50,7 @@ def test_pictures_are_made(name: str, tmp_path: Path) -> None:
     gallery.save(gallery.PICTURES[name](), tmp_path / "made.png")
     made, kept = grey(tmp_path / "made.png"), grey(gallery.IMAGES / f"{name}.png")
     assert np.ptp(made) > 0.2, "nothing is drawn"
-    assert abs(made - kept).mean() < DIFFERENCE, "make gallery has not been run"
+    assert abs(made - kept).max() < DIFFERENCE, "make gallery has not been run"
 
 
 def test_pictures_and_page_belong_together() -> None:
