@@ -12,6 +12,7 @@ import pytest
 from PIL import Image
 
 import polypod as pp
+from polypod.scene import Scene
 
 sys.path.insert(0, str(Path(__file__).parent))
 
@@ -78,3 +79,14 @@ def test_mechanisms_of_the_gallery_are_sound(path: Path) -> None:
     assert mech.name == path.stem
     assert bool(mech.limits(mech.home).within)
     assert not any("singular" in warning for warning in mech.warnings)
+
+
+def test_planar_platforms_are_drawn_above_their_joints() -> None:
+    """Though base and platform joints lie in one plane, their plates are on both sides of it."""
+    mech = gallery.mechanism("planar")
+    thick = 1e-3 * mech.to_dict()["legs"][0]["radius"]
+    height = Scene(mech, mech.home).solids.faces()[:, :, 2] / thick
+    level = height[np.ptp(height, axis=1) < 1e-9].mean(axis=1)
+    # The inner side of a plate is two radii from its joints, the outer one nearly three; pins end at two.
+    assert ((level > 2.5) & (level < 3.5)).any()
+    assert -3.5 < height.min() < -2.5
