@@ -27,7 +27,7 @@ RUST := Cargo.toml $(wildcard Cargo.lock) $(shell find crates -name target -prun
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help demo test test-all test-rust tools lint bench docs wheel lock clean
+.PHONY: help demo test test-all test-rust tools lint bench docs gallery wheel lock clean
 
 help: ## list the targets
 	@awk 'BEGIN { FS = ":.*## " } /^[a-z-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' Makefile
@@ -68,6 +68,9 @@ bench: $(BUILT) ## measure the speed, beside alternatives, and write docs/perfor
 
 docs: $(BUILT) ## build the site into site/
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
+
+gallery: $(BUILT) ## draw the pictures of the site's gallery again
+	$(BIN)/python docs/gallery.py
 
 wheel: $(DEPS) ## build a wheel for this machine into dist/
 	$(BIN)/maturin build --release $(LOCKED) --out dist

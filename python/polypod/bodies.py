@@ -168,8 +168,10 @@ class _Shapes:
         self._thick = max(self._radii)
         home = mech.inverse_kinematics(mech.home)
         self._home_lengths = home.lengths
-        platform = (self._base + home.vectors).mean(axis=0)
-        base = (self._base.mean(axis=0) - mech.home[:3, 3]) @ mech.home[:3, :3]
+        # Of a planar mechanism, whose joints lie in one plane, the base is below and the platform above.
+        above = 1e-6 * mech.characteristic_length * np.array([0.0, 0.0, 1.0])
+        platform = (self._base + home.vectors).mean(axis=0) + above
+        base = (self._base.mean(axis=0) - mech.home[:3, 3] - above) @ mech.home[:3, :3]
         self._up = _plate_normal(self._base, platform - self._base.mean(axis=0))
         self._down = _plate_normal(self._platform, base - self._platform.mean(axis=0))
 

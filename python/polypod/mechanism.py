@@ -337,9 +337,16 @@ class Mechanism:
         return State(self, **out | named)
 
     def coordinates(self, pose: ArrayLike, set: str | None = None) -> dict[str, Array]:
-        """All numbers of a coordinate set at a pose, m and rad: the inverse of `pose`.
+        """All numbers of a coordinate set at a pose, each (...), m and rad: the inverse of `pose`.
 
-        The first set by default. NaN for a pose that breaks a constraint.
+        NaN for a pose that breaks a constraint.
+
+        Args:
+            pose: (..., 4, 4).
+            set: its name; the first of `coordinate_sets` by default.
+
+        Raises:
+            UnknownNameError: no such set.
         """
         set = next(iter(self._sets)) if set is None else set
         if set not in self._sets:
@@ -370,7 +377,9 @@ class Mechanism:
     # --- kinematics --------------------------------------------------------------------------------------
 
     def inverse_kinematics(self, pose: ArrayLike) -> InverseKinematics:
-        """Lengths, vectors and directions of the legs at a pose (..., 4, 4) [Eq. 3].
+        """Lengths (..., n), m, vectors and directions (..., n, 3) of the legs at a pose (..., 4, 4) [Eq. 3].
+
+        Vectors are in base axes.
 
         >>> import polypod as pp
         >>> mech = pp.load("lu-3spu-2rpu-r")
@@ -383,7 +392,8 @@ class Mechanism:
     def jacobian(self, pose: ArrayLike) -> Array:
         """(..., 6, 6): J of `J V = (ℓ', 0)`: actuated legs, then independent constraints [Eq. 13].
 
-        For any pose, on the constraints or not.
+        V = (v, ω) at o in base axes, m/s and rad/s; the first three columns of a leg's row have no unit, the
+        others are in m. For any pose (..., 4, 4), on the constraints or not.
         """
         (poses,) = POSE(pose)
         return self._core.jacobian(poses)["jacobian"]
@@ -391,21 +401,30 @@ class Mechanism:
     def hessian(self, pose: ArrayLike) -> Array:
         """(..., 6, 6, 6): H of `J A + Vᵀ H V = (ℓ'', 0)`, a symmetric layer for each row of J [Eq. 15-19].
 
-        For any pose, on the constraints or not.
+        Twist and acceleration at o in base axes; a leg's layer is in 1/m, 1 and m for (v, v), (v, ω) and
+        (ω, ω). For any pose (..., 4, 4), on the constraints or not.
         """
         (poses,) = POSE(pose)
         return self._core.hessian(poses)["hessian"]
 
     def kinematics(self, pose: ArrayLike, twist: ArrayLike, acceleration: ArrayLike) -> Kinematics:
-        """Motion of all legs, rods, links and joints [Eq. 2-39].
+        """Motion of all legs, rods, links and joints, SI, vectors in base axes [Eq. 2-39].
 
         A twist or acceleration that breaks a constraint has the status OFF_CONSTRAINT and no numbers.
+
+        Args:
+            pose: (..., 4, 4).
+            twist: (v, ω) at o in base axes, (..., 6), m/s and rad/s.
+            acceleration: (a, ε) at o in base axes, (..., 6), m/s² and rad/s²; a is that of the point o.
         """
         states = MOTION(pose, twist, acceleration)
         return Kinematics(self, **self._core.kinematics(*states))
 
     def platform_twist(self, pose: ArrayLike, rates: ArrayLike) -> tuple[Array, Codes]:
-        """The twist (..., 6) that gives the legs these rates (..., n), m/s, and the status [Eq. 13]."""
+        """The twist (..., 6) that gives the legs these rates (..., n), m/s, and the status [Eq. 13].
+
+        At a pose (..., 4, 4); the twist is at o in base axes, m/s and rad/s.
+        """
         arrays = Arguments(pose=(4, 4), rates=(self.n_legs,))(pose, rates)
         out = self._core.platform_twist(*arrays)
         return out["twist"], out["status"]
@@ -413,7 +432,10 @@ class Mechanism:
     def platform_acceleration(
         self, pose: ArrayLike, twist: ArrayLike, accelerations: ArrayLike
     ) -> tuple[Array, Codes]:
-        """The acceleration (..., 6) that gives the legs theirs (..., n), and the status [Eq. 19]."""
+        """The acceleration (..., 6) that gives the legs theirs (..., n), m/s², and the status [Eq. 19].
+
+        For a pose (..., 4, 4) and twist (..., 6); at o in base axes, m/s² and rad/s².
+        """
         wanted = Arguments(pose=(4, 4), twist=(6,), accelerations=(self.n_legs,))
         arrays = wanted(pose, twist, accelerations)
         out = self._core.platform_acceleration(*arrays)
@@ -422,10 +444,10 @@ class Mechanism:
     # --- singularities -----------------------------------------------------------------------------------
 
     def conditioning(self, pose: ArrayLike, *, length: float | None = None) -> Conditioning:
-        """Singular values of the leg Jacobian on the allowed twists [T24].
+        """Singular values (...) of the leg Jacobian on the allowed twists at a pose (..., 4, 4) [T24].
 
-        `length`, m, is what turns are counted with: an angle is an arc of that radius; by default the
-        `characteristic_length`.
+        Pure numbers. `length`, m, is what turns are counted with: an angle is an arc of that radius; by
+        default the `characteristic_length`.
         """
         (poses,) = POSE(pose)
         return Conditioning(self, **self._core.conditioning(poses, self._length(length)))

@@ -169,12 +169,11 @@ def _isometric() -> tuple[Array, Array]:
 
 
 def _draw_faces(ax: Axes, workspace: Workspace, points: Array, right: Array, up: Array) -> None:
-    """The faces that look at the viewer, those behind first."""
+    """All faces, those behind first: where the mesh has small folds, those that look away close the gaps."""
     corners = points[workspace.faces]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     viewer = np.cross(right, up)
-    seen = normals @ viewer > 0.0
-    seen &= np.linalg.norm(normals, axis=1) > 0.0
+    seen = np.linalg.norm(normals, axis=1) > 0.0
     smooth = _smoothed(workspace, normals)[seen]
     corners = corners[seen]
     order = np.argsort(corners.mean(axis=1) @ viewer, kind="stable")

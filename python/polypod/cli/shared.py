@@ -12,6 +12,7 @@ import typer
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
+from rich.text import Text
 
 MechanismArgument = Annotated[
     str, typer.Argument(metavar="MECHANISM", help="A mechanism file (.toml) or a built-in mechanism's name.")
@@ -58,9 +59,9 @@ def console() -> Console:
 
 def new_table(title: str, *headers: str) -> Table:
     """A table with its columns' headers; `>` at the end of one puts its column to the right."""
-    table = Table(
-        title=title, title_justify="left", title_style="bold", show_header=any(map(_plain, headers))
-    )
+    # A title may be wider than its table.
+    text = Text(title, style="bold", no_wrap=True, overflow="ignore")
+    table = Table(title=text, title_justify="left", show_header=any(map(_plain, headers)))
     for header in headers:
         table.add_column(_plain(header), justify="right" if header.endswith(">") else "left")
     return table
