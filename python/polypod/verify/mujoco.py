@@ -18,11 +18,11 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from polypod.multibody.placement import BASE, PLATFORM, cross, inverse, turn_about
+from polypod.multibody.tree import POINT, Body, Closure, Freedom, Multibody, joint_values
 from polypod.status import Status
 from polypod.verify.forced import Forced, inertial, light, pull
-from polypod.verify.placement import BASE, PLATFORM, cross, inverse, turn_about
 from polypod.verify.rows import Start
-from polypod.verify.tree import POINT, Body, Closure, Freedom, Multibody, joint_values
 
 Array = NDArray[np.float64]
 
