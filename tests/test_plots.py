@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 import polypod as pp
 from polypod import plots
 from polypod.errors import PolypodError, ShapeError
-from polypod.solids import Solids
+from polypod.scene import Scene
 from polypod.style import PALETTE
 
 NAME = "lu-3spu-2rpu-r"
@@ -207,22 +207,13 @@ def test_passive_leg_with_a_fixed_joint(tmp_path):
     assert "piston post" not in [text.get_text() for text in ax.texts]
 
 
-@pytest.mark.parametrize("normal", [[0.0, 0.0, 1.0], [0.6, 0.0, 0.8]])
-def test_plates_reach_as_far_as_their_margin(normal):
-    """Round one joint and round joints on a line."""
-    normal = np.array(normal)
-    side = np.cross(normal, [0.0, 1.0, 0.0])
-    for spots in ([0.0], [0.0, 1.0], [0.0, 1.0, 3.0]):
-        solids = Solids()
-        points = np.array([spot * side for spot in spots])
-        solids.plate(points, normal, thickness=0.1, margin=0.5, color="white", viewer=normal)
-        corners = solids.faces().reshape(-1, 3)
-        nearest = np.clip(corners @ side, 0.0, max(spots))[:, None] * side
-        distance = np.linalg.norm(corners - nearest, axis=-1)
-        assert distance.max() < np.hypot(0.5, 0.1) + 1e-9
-        assert (corners @ side).max() == pytest.approx(max(spots) + 0.5, abs=2e-3)
-        assert solids.shades().shape == (len(solids.faces()), 3)
-        assert ((solids.shades() >= 0) & (solids.shades() <= 1)).all()
+@pytest.mark.parametrize("file", FILES)
+def test_faces_of_a_scene_have_colours_and_look_at_the_viewer(file):
+    mech = pp.load(file)
+    scene = Scene(mech, mech.home)
+    corners, colors = scene.faces.seen(np.array([0.0, 0.0, 1.0]))
+    assert len(corners) == len(colors) < len(scene.faces.corners())
+    assert ((colors >= 0.0) & (colors <= 1.0)).all()
 
 
 # --- topology -----------------------------------------------------------------------------------------------

@@ -3,24 +3,45 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
+from matplotlib.colors import to_rgb
 from matplotlib.lines import Line2D
 from matplotlib.patheffects import withStroke
 from mpl_toolkits.mplot3d import Axes3D  # type: ignore[import-untyped]
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # type: ignore[import-untyped]
 from numpy.typing import NDArray
+from trimesh import Trimesh
 
+from polypod.bodies import JOINT, Link, leg_radii, link_frames, links_of
 from polypod.mechanism import Mechanism
-from polypod.solids import Solids
-from polypod.style import INK, PALE, color_of
+from polypod.solids import four_sided, tube
+from polypod.style import INK
 
 Array = NDArray[np.float64]
+Inside = Callable[[Array], NDArray[np.bool_]]
 
-STEEL, JOINT, BASE, PLATFORM, ROD = "#E8ECF0", "#4A4F57", "#C9CDD3", "#9CC3DF", "#8A6D3B"
+LIGHT = np.array([-0.35, -0.55, 0.76])
+"""Direction towards the light, base axes."""
+
 _HALO = [withStroke(linewidth=2.2, foreground="white", alpha=0.85)]
+
+
+def _moved(points: Array, place: Array) -> Array:
+    """Points (..., 3) in axes that stand at `place` (4, 4)."""
+    return np.asarray(points @ place[:3, :3].T + place[:3, 3])
+
+
+def _inside(cylinder: Link, place: Array, corners: Array) -> NDArray[np.bool_]:
+    """Which faces (k, 4, 3), in axes that stand at `place` in the cylinder's, lie inside its barrel."""
+    barrel = next(piece.mesh for piece in cylinder.pieces if piece.name == "barrel")
+    (_, low, _), (radius, high, _) = barrel.bounds
+    at = _moved(corners, place)
+    within = (np.hypot(at[..., 0], at[..., 2]) < 0.9 * radius) & (low < at[..., 1]) & (at[..., 1] <= high)
+    return np.asarray(within.all(axis=1))
 
 
 class _JointLabel(NamedTuple):
@@ -41,56 +62,75 @@ class _JointLabel(NamedTuple):
         return self.at + self.distance * (x * right + y * up) / size
 
 
+class Faces:
+    """Faces of bodies with their colours; m, base axes."""
+
+    def __init__(self) -> None:
+        self._corners: list[Array] = []
+        self._normals: list[Array] = []
+        self._colors: list[Array] = []
+
+    def add(
+        self, mesh: Trimesh, color: str, place: Array | None = None, inside: Inside | None = None
+    ) -> None:
+        """The faces of a body in axes that stand at `place` (4, 4), but for those that `inside` tells of."""
+        place = np.eye(4) if place is None else place
+        corners, normals = four_sided(mesh)
+        if inside is not None:
+            shown = ~inside(corners)
+            corners, normals = corners[shown], normals[shown]
+        self._corners.append(_moved(corners, place))
+        self._normals.append(normals @ place[:3, :3].T)
+        self._colors.append(np.broadcast_to(to_rgb(color), (len(corners), 3)))
+
+    def corners(self) -> Array:
+        """(N, 4, 3), m."""
+        return np.concatenate(self._corners)
+
+    def seen(self, viewer: Array) -> tuple[Array, Array]:
+        """Corners (k, 4, 3) and colours (k, 3) in the light of the faces that look towards a viewer.
+
+        Red, green, blue from 0 to 1. In perspective some that look a little away are seen, too.
+        """
+        normals = np.concatenate(self._normals)
+        front = normals @ viewer > -0.25
+        towards = normals[front] @ (LIGHT / np.linalg.norm(LIGHT))
+        diffuse = 0.58 + 0.42 * (0.5 + 0.5 * towards)
+        gloss = 0.32 * np.clip(towards, 0.0, 1.0) ** 12
+        shaded = np.concatenate(self._colors)[front] * diffuse[:, None]
+        return self.corners()[front], np.clip(shaded + (1.0 - shaded) * gloss[:, None], 0.0, 1.0)
+
+
 class Scene:
-    """A mechanism at a pose as solids, and where the labels go."""
+    """A mechanism at a pose as faces in space, and where the labels go."""
 
     def __init__(self, mech: Mechanism, pose: Array) -> None:
         spec = mech.geometry
-        self.solids = Solids()
-        self.overlay = Solids()
+        self.faces = Faces()
+        self.overlay = Faces()
         """What is drawn over the bodies even where they hide it."""
         self.labels: list[tuple[Array, str]] = []
         self.joint_labels: list[_JointLabel] = []
-        self.kinds: dict[str, None] = {}  # joint kinds in use, in order
-        self._pose, self._rotation = pose, pose[:3, :3]
-        legs = mech.inverse_kinematics(pose)
-        self._size = mech.characteristic_length
+        sides = [leg[side]["joint"] for leg in spec["legs"] for side in ("base", "platform")]
+        self.kinds = dict.fromkeys(sides)  # joint kinds in use, in order
+        self._size, thick = mech.characteristic_length, max(leg_radii(mech))
+        self._add_links(links_of(mech), link_frames(mech, pose).frames)
         base = np.array([leg["base"]["point"] for leg in spec["legs"]])
-        platform = base + legs.vectors
-        home_platform = base + mech.inverse_kinematics(mech.home).vectors
-        stroke, home_lengths = mech.stroke, mech.inverse_kinematics(mech.home).lengths
-        up = _plate_normal(base, home_platform.mean(axis=0) - base.mean(axis=0))
-        local = np.array([leg["platform"]["point"] for leg in spec["legs"]])
-        base_at_home = (base.mean(axis=0) - mech.home[:3, 3]) @ mech.home[:3, :3]
-        down = self._rotation @ _plate_normal(local, base_at_home - local.mean(axis=0))
-        radii = [leg["radius"] or 0.085 * self._size for leg in spec["legs"]]
-        thick = max(radii)
-
-        self._plate(base, up, thick, BASE)
-        self._plate(platform, down, thick, PLATFORM)
-        for i, rod in enumerate(spec["rods"]):
-            on = [j for j, leg in enumerate(spec["legs"]) if leg["base"]["rod"] == i]
-            self._rod(rod, base[on], thick)
-        for i, leg in enumerate(spec["legs"]):
-            shortest, name = float(stroke[i, 0]), mech.leg_names[i]
-            body = 0.8 * shortest if shortest > 0 else 0.6 * float(home_lengths[i])
-            self._leg(leg, base[i], platform[i], body, radii[i], color_of(i))
-            rod = leg["base"]["rod"]
-            lower = None if rod is None else np.cross(spec["rods"][rod]["axis"], legs.directions[i])
-            self._joint(leg["base"], np.eye(3), base[i], legs.directions[i], radii[i], up, lower)
-            self._joint(
-                leg["platform"], self._rotation, platform[i], legs.directions[i], radii[i], down, None
-            )
+        platform = base + mech.inverse_kinematics(pose).vectors
+        for i, name in enumerate(mech.leg_names):
             for letter, points, leg_side in (("B", base, 1), ("b", platform, -1)):
                 text = f"${letter}_{{{math_name(name)}}}$"
                 away = points[i] - points.mean(axis=0)
                 self.joint_labels.append(_JointLabel(points[i], away, leg_side, 5.2 * thick, text))
-        self._triad(self.solids, np.eye(4), "O", "XYZ")
+        for i, rod in enumerate(spec["rods"]):
+            on = [j for j, leg in enumerate(spec["legs"]) if leg["base"]["rod"] == i]
+            self._rod_label(rod, base[on], thick)
+        self._triad(self.faces, np.eye(4), "O", "XYZ")
         self._triad(self.overlay, pose, "o", "xyz")
 
     def corners(self) -> Array:
-        """(n, 3): corners of all faces, two of each, and the labels, m."""
-        bodies = [s.faces()[:, ::2].reshape(-1, 3) for s in (self.solids, self.overlay)]
+        """(n, 3): two corners of each face, and the labels, m."""
+        bodies = [faces.corners()[:, ::2].reshape(-1, 3) for faces in (self.faces, self.overlay)]
         return np.concatenate([*bodies, [at for at, _ in self.placed_labels()]])
 
     def placed_labels(self) -> list[tuple[Array, str]]:
@@ -98,74 +138,33 @@ class Scene:
         right, up = _right_and_up()
         return [*self.labels, *((label.place(right, up), label.text) for label in self.joint_labels)]
 
-    def _plate(self, points: Array, normal: Array, thick: float, color: str) -> None:
-        """A plate behind the joints, with a post for each of them."""
-        behind = points - 2.0 * thick * normal
-        self.solids.plate(behind, normal, 0.9 * thick, 2.4 * thick, color, np.cross(*_right_and_up()))
-        height = float(np.min(behind @ normal))
-        for point in points:
-            foot = point - (float(point @ normal) - height) * normal
-            self.solids.tube(foot, point, 1.1 * thick, color, end_radius=0.75 * thick)
+    def _add_links(self, links: tuple[Link, ...], frames: Array) -> None:
+        """All links; but nothing inside a barrel, which faces sorted by their depth would not hide."""
+        for k, (link, place) in enumerate(zip(links, frames, strict=True)):
+            if not np.isfinite(place).all():
+                continue  # a leg without length, which has no direction
+            # A piston comes right after its cylinder.
+            cylinder = {"cylinder": k, "piston": k - 1}.get(link.kind)
+            inside = None
+            if cylinder is not None:
+                inside = partial(_inside, links[cylinder], np.linalg.inv(frames[cylinder]) @ place)
+            for piece in link.pieces:
+                self.faces.add(piece.mesh, piece.color, place, inside)
 
-    def _rod(self, rod: dict[str, Any], points: Array, thick: float) -> None:
+    def _rod_label(self, rod: dict[str, Any], points: Array, thick: float) -> None:
         axis, start = np.array(rod["axis"]), np.array(rod["point"])
         axis = axis / np.linalg.norm(axis)
         along = (points - start) @ axis
-        low, high = start + (along.min() - 3.2 * thick) * axis, start + (along.max() + 3.2 * thick) * axis
-        self.solids.tube(low, high, 0.6 * thick, ROD)
-        for end, inwards in ((low, 1.0), (high, -1.0)):
-            self.solids.tube(end, end + 0.9 * inwards * thick * axis, 1.0 * thick, JOINT)
         side = start + (0.7 * along.min() + 0.3 * along.max()) * axis
         self.labels.append((side + np.array([0.0, 0.0, 2.2 * thick]), f"${math_name(rod['name'])}$"))
 
-    def _leg(
-        self, leg: dict[str, Any], start: Array, end: Array, body: float, radius: float, color: str
-    ) -> None:
-        """Cylinder and piston; a passive leg is pale."""
-        length = float(np.linalg.norm(end - start))
-        direction = (end - start) / length
-        neck, body = min(2.4 * radius, 0.15 * length), min(body, 0.92 * length)
-        at = [start + d * direction for d in (neck, body - 1.5 * radius, body)]
-        self.solids.tube(start, at[0], 0.5 * radius, STEEL)
-        self.solids.tube(at[0], at[1], radius, color if leg["actuated"] else PALE)
-        self.solids.tube(at[1], at[2], 1.18 * radius, JOINT)
-        self.solids.tube(at[2], end, 0.55 * radius, STEEL)
-
-    def _joint(
-        self,
-        joint: dict[str, Any],
-        rotation: Array,
-        at: Array,
-        direction: Array,
-        radius: float,
-        normal: Array,
-        on_rod: Array | None,
-    ) -> None:
-        """`on_rod`: the direction of the axis of a revolute joint on a rod."""
-        kind = joint["joint"]
-        self.kinds[kind] = None
-        axis = None if joint["axis"] is None else rotation @ np.array(joint["axis"])
-        axis = on_rod if on_rod is not None else axis
-        if kind == "S" or axis is None:
-            self.solids.ball(at, 1.45 * radius, JOINT)
-        elif kind == "F":
-            self.solids.block(at, normal, 2.4 * radius, JOINT)
-        else:
-            self._pin(at, axis, 2.0 * radius, 0.75 * radius)
-            if kind == "U":
-                self._pin(at, np.cross(axis, direction), 2.0 * radius, 0.75 * radius)
-
-    def _pin(self, at: Array, axis: Array, half: float, radius: float) -> None:
-        step = axis * (half / np.linalg.norm(axis))
-        self.solids.tube(at - step, at + step, radius, JOINT)
-
-    def _triad(self, solids: Solids, pose: Array, origin: str, names: str) -> None:
+    def _triad(self, faces: Faces, pose: Array, origin: str, names: str) -> None:
         size = 0.66 * self._size
         start = pose[:3, 3]
         for column, name in enumerate(names):
             tip, neck = (start + part * size * pose[:3, column] for part in (1.0, 0.78))
-            solids.tube(start, neck, 0.018 * self._size, INK, sides=10)
-            solids.tube(neck, tip, 0.055 * self._size, INK, end_radius=0.0)
+            faces.add(tube(start, neck, 0.018 * self._size, sides=10), INK)
+            faces.add(tube(neck, tip, 0.055 * self._size, end_radius=0.0), INK)
             self.labels.append((start + 1.17 * (tip - start), f"${name}$"))
         self.labels.append((start - 0.16 * size * pose[:3, :3].sum(axis=1), f"${origin}$"))
 
@@ -173,11 +172,11 @@ class Scene:
 def draw(ax: Axes3D, scene: Scene, half: Array, zoom: float, labels: bool) -> None:
     """A scene, centred in its axes, at a scale that `half` and `zoom` set (see `frame`)."""
     ax.computed_zorder = False
-    for solids, zorder in ((scene.solids, 1.0), (scene.overlay, 2.0)):
-        shades = solids.shades()
+    for part, zorder in ((scene.faces, 1.0), (scene.overlay, 2.0)):
+        corners, shades = part.seen(np.cross(*_right_and_up()))
         # Edges of the same colour close the seams; as a picture inside the SVG the many faces stay small.
         faces = Poly3DCollection(
-            solids.faces(), facecolors=shades, edgecolors=shades, linewidths=0.25, rasterized=True
+            corners, facecolors=shades, edgecolors=shades, linewidths=0.25, rasterized=True
         )
         faces.set(zorder=zorder, clip_on=False)
         ax.add_collection3d(faces, autolim=False)
@@ -247,20 +246,6 @@ def joint_handles(kinds: Iterable[str]) -> list[Line2D]:
         for kind, (marker, size, text) in _JOINTS.items()
         if kind in set(kinds)
     ]
-
-
-def _plate_normal(points: Array, towards: Array) -> Array:
-    """Unit normal of the plane through points as well as can be, on the side of `towards`."""
-    _, sizes, axes = np.linalg.svd(points - points.mean(axis=0))
-    flat = len(sizes) > 1 and sizes[1] > 1e-9 * max(sizes[0], 1e-300)
-    if flat:
-        normal = axes[2]
-    else:  # joints on one line, or in one point
-        along = axes[0] if sizes[0] > 0 else np.zeros(3)
-        normal = towards - (towards @ along) * along
-        normal = normal / np.linalg.norm(normal)
-    normal = np.asarray(normal)
-    return normal if normal @ towards >= 0 else -normal
 
 
 def math_name(name: str) -> str:
