@@ -18,7 +18,7 @@ from polypod.boundary import Cuts, content_with_error, surface
 from polypod.errors import WorkspaceError
 from polypod.mechanism import Mechanism
 from polypod.regions import Grid
-from polypod.results import _replacing
+from polypod.results import replacing
 from polypod.style import GREY, INK, PALE, YELLOW, color_of
 from polypod.units import coordinate_unit
 
@@ -168,7 +168,7 @@ class Workspace:
         """
         path = Path(path)
         check_suffix(path, len(self.names))
-        with _replacing(path) as temporary:
+        with replacing(path) as temporary:
             if path.suffix == ".nc":
                 self.to_xarray().assign_attrs(polypod_format=_FORMAT).to_netcdf(temporary, engine="scipy")
             elif path.suffix == ".stl":

@@ -20,6 +20,7 @@ COMMANDS = (
     "fk",
     "workspace",
     "verify",
+    "export",
 )
 
 app = typer.Typer(

@@ -1,4 +1,4 @@
-"""A mechanism as a model file for MuJoCo (MJCF): loops closed by equalities, a motor for each actuated leg."""
+"""A mechanism as a model file for MuJoCo (MJCF): loops closed by equalities, motors along the legs."""
 
 from __future__ import annotations
 
@@ -32,12 +32,13 @@ STEP = 0.001
 """s."""
 OPTION = {"timestep": repr(STEP), "integrator": "implicitfast", "tolerance": "1e-12"}
 CLOSURE = {"solref": f"{2 * STEP!r} 1", "solimp": "0.9999 0.9999 0.001 0.5 2"}
-"""MuJoCo's loops are springs: a time constant of two steps, the shortest that is stable, critically damped, and
-the highest impedance. At rest they give way by about 1e-4 (2 STEP)^2 times the acceleration that they hold
-back."""
+"""MuJoCo's loops are springs: a time constant of two steps, the shortest that is stable, critically damped,
+and the highest impedance. At rest they give way by 1e-4 (2 STEP)^2 times the acceleration that they hold."""
 
 
-def mjcf(model: Model, shapes: Mapping[str, Sequence[Shape]], pose: Array | None = None) -> tuple[str, list[str]]:
+def mjcf(
+    model: Model, shapes: Mapping[str, Sequence[Shape]], pose: Array | None = None
+) -> tuple[str, list[str]]:
     """The model file, and what it leaves out.
 
     Args:
@@ -56,9 +57,10 @@ def mjcf(model: Model, shapes: Mapping[str, Sequence[Shape]], pose: Array | None
     notes = lost(model, STROKES | TURNS | FORCES, gravity=True)
     crosses = [joint for joint in model.closing if joint.kind == "U"]
     if crosses:
+        names = ", ".join(model.names("link", cross_name(joint)) for joint in crosses)
         notes.append(
-            f"each universal joint at the platform has a cross, a body of {model.light[0]:g} kg that the "
-            f"mechanism does not have: {', '.join(model.names(cross_name(joint)) for joint in crosses)}."
+            f"universal joints at the platform have a cross of {model.light[0]:g} kg, no link of the "
+            f"mechanism: {names}."
         )
     poses = {"home": model.mech.home} | ({} if pose is None else {"pose": pose})
     notes += _add_keys(made, model, poses)
@@ -72,7 +74,7 @@ def _add_ranges(made: Skeleton, model: Model) -> None:
         for i in range(len(body.freedoms)):
             allowed = model.range_of(body, i)
             if allowed is not None:
-                node = joints[model.names(joint_name(body, i))]
+                node = joints[model.names("joint", joint_name(body, i))]
                 node.set("range", numbers([allowed.least, allowed.greatest]))
 
 
@@ -82,7 +84,7 @@ def _add_shapes(made: Skeleton, model: Model, shapes: Mapping[str, Sequence[Shap
     look = {"contype": "0", "conaffinity": "0", "group": "1"}
     for body, of in shapes.items():
         for shape in of:
-            name = model.names(shape.name)
+            name = model.names("shape", shape.name)
             attributes = {"name": name, "rgba": " ".join(f"{c:.4g}" for c in shape.rgba)}
             if shape.mesh is not None:
                 # A shell: of overlapping pieces, the mass of which does not count, any inertia will do.
@@ -111,8 +113,8 @@ def _add_motors(made: Skeleton, model: Model) -> None:
     for i, leg in enumerate(model.tree.legs):
         if not leg.actuated:
             continue
-        joint = model.names(joint_name(bodies[leg.piston], 0))
-        attributes = {"name": model.names(f"leg {leg.name}"), "joint": joint}
+        joint = model.names("joint", joint_name(bodies[leg.piston], 0))
+        attributes = {"name": model.names("motor", f"leg {leg.name}"), "joint": joint}
         allowed = model.force_of(i)
         if allowed is not None:
             attributes["ctrlrange"] = numbers([allowed.least, allowed.greatest])
@@ -125,7 +127,7 @@ def _add_keys(made: Skeleton, model: Model, poses: Mapping[str, Array]) -> list[
     order = [node.get("name") for node in made.root.iter() if node.tag in ("joint", "freejoint")]
     for name, pose in poses.items():
         found = configuration(model.tree, model.tree.start(pose))
-        positions = {model.names(joint): value for joint, value in found.items()}
+        positions = {model.names("joint", joint): value for joint, value in found.items()}
         qpos = np.concatenate([positions[joint] for joint in order if joint in positions])
         attributes = {"name": name, "qpos": numbers(qpos)}
         forces = holding_forces(model.mech, pose)
@@ -138,7 +140,7 @@ def _add_keys(made: Skeleton, model: Model, poses: Mapping[str, Array]) -> list[
 
 
 def holding_forces(mech: Mechanism, pose: Array) -> Array | None:
-    """(n,): active forces, N, at rest without a load and at efficiency 1, as models have it; None if singular."""
+    """(n,): active forces at rest without a load and at efficiency 1, N; None where none are determined."""
     tables = mech.to_dict()
     tables["dynamics"] = tables.get("dynamics", {}) | {"efficiency": 1.0}
     rest = np.zeros(6)

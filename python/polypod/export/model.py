@@ -91,30 +91,27 @@ class Model:
         """The comment at the head of a file."""
         facts = [
             f"{self.mech.name}: {format}, written by Polypod {_core.__version__}.",
-            "Units: m, kg, s, rad. Frames: base axes; a leg's links have (n, delta, n x delta) at B and at b.",
+            "Units: m, kg, s, rad. A leg's links have the axes (n, delta, n x delta) at B and at b.",
         ]
-        renamed = [f"{given} is {name}" for given, name in self.names.changed().items()]
+        renamed = [f"{given} is {name}" for given, name in self.names.changed("link").items()]
         if renamed:
             facts.append(f"Names: {'; '.join(renamed)}.")
         return "\n".join([*facts, *(f"Note: {note}" for note in notes)])
 
 
-def _labels(tree: Multibody, closing: Sequence[ClosingJoint]) -> dict[str, str]:
-    """What joints are called instead of the names that they have in the multibody description."""
-    labels = {}
-    for body in tree.bodies:
-        labels |= {joint_name(body, i): f"{body.name} joint {i + 1}" for i in range(len(body.freedoms))}
+def _labels(tree: Multibody, closing: Sequence[ClosingJoint]) -> dict[tuple[str, str], str]:
+    """What joints and crosses are called instead of their names in the multibody description."""
+    labels: dict[tuple[str, str], str] = {}
+    bodies = {body.name: body for body in tree.bodies}
     for leg, joint in zip(tree.legs, closing, strict=True):
-        labels[f"{leg.piston} 0"] = f"leg {leg.name} slide"
-        cylinder = next(body for body in tree.bodies if body.name == leg.cylinder)
+        cylinder, piston = bodies[leg.cylinder], bodies[leg.piston]
         for i in range(len(cylinder.freedoms)):
-            labels[joint_name(cylinder, i)] = f"leg {leg.name} base joint {i + 1}"
-        labels[cross_name(joint)] = f"leg {leg.name} cross"
-        labels[f"{cross_name(joint)} 0"] = f"leg {leg.name} platform joint 1"
+            labels["joint", joint_name(cylinder, i)] = f"leg {leg.name} base joint {i + 1}"
+        labels["joint", joint_name(piston, 0)] = f"leg {leg.name} slide"
+        labels["link", cross_name(joint)] = f"leg {leg.name} cross"
+        labels["joint", f"{cross_name(joint)} 0"] = f"leg {leg.name} platform joint 1"
     return labels
 
 
 def _range(given: Sequence[float] | None) -> Range | None:
     return None if given is None else Range(float(given[0]), float(given[1]))
-
-

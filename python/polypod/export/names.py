@@ -14,26 +14,28 @@ RESERVED = {"world"}
 class Names:
     """Legal and unique names for what a model consists of: ASCII letters, digits and `_`, a letter first."""
 
-    def __init__(self, labels: Mapping[str, str] | None = None) -> None:
-        self._labels = labels or {}
-        self._given: dict[str, str] = {}
+    def __init__(self, labels: Mapping[tuple[str, str], str] | None = None, longest: int = 255) -> None:
+        self._labels, self._longest = labels or {}, longest
+        self._given: dict[tuple[str, str], str] = {}
         self._taken = set(RESERVED)
 
-    def __call__(self, name: str) -> str:
-        """The legal name for a name: the same whenever it is asked for, and no other's."""
-        if name not in self._given:
-            wanted = legal(self._labels.get(name, name))
-            found, number = wanted, 2
+    def __call__(self, kind: str, name: str) -> str:
+        """The legal name for a thing of a kind: the same whenever it is asked for, and no other's."""
+        key = (kind, name)
+        if key not in self._given:
+            wanted = legal(self._labels.get(key, name))
+            found, number = wanted[: self._longest], 2
             while found in self._taken:
-                found, number = f"{wanted}_{number}", number + 1
+                end = f"_{number}"
+                found, number = wanted[: self._longest - len(end)] + end, number + 1
             self._taken.add(found)
-            self._given[name] = found
-        return self._given[name]
+            self._given[key] = found
+        return self._given[key]
 
-    def changed(self) -> dict[str, str]:
-        """What is not only spaces that became `_`: names of the mechanism file by the new ones."""
-        labels = {given: self._labels.get(name, name) for name, given in self._given.items()}
-        return {given: label for given, label in labels.items() if given != label.replace(" ", "_")}
+    def changed(self, kind: str) -> dict[str, str]:
+        """Names of a kind by the legal ones, where more changed than spaces that became `_`."""
+        of = {given: self._labels.get(key, key[1]) for key, given in self._given.items() if key[0] == kind}
+        return {given: name for given, name in of.items() if given != name.replace(" ", "_")}
 
 
 def legal(name: str) -> str:

@@ -70,7 +70,7 @@ def meshes(mech: Mechanism) -> dict[str, list[Shape]]:
 
 
 def _joined(pieces: list[trimesh.Trimesh]) -> trimesh.Trimesh:
-    joined: trimesh.Trimesh = trimesh.util.concatenate([piece.copy() for piece in pieces])
+    joined: trimesh.Trimesh = trimesh.util.concatenate([piece.copy() for piece in pieces])  # type: ignore[assignment]
     return joined
 
 

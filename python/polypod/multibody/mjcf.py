@@ -34,8 +34,8 @@ class Settings:
     """Mass and inertia of a body in the model's units; MuJoCo takes none without mass."""
     light: Inertial
     """Those of the cross of a universal joint."""
-    name: Callable[[str], str] = field(default=lambda name: name)
-    """A name as the file has it."""
+    name: Callable[[str, str], str] = field(default=lambda kind, name: name)
+    """A name as the file has it, from its kind (model, link, joint, site) and what it is called here."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,16 +52,16 @@ class Skeleton:
 
 def skeleton(tree: Multibody, settings: Settings) -> Skeleton:
     """Bodies, joints, inertias and an equality for each closure [T64]."""
-    root = ElementTree.Element("mujoco", model=settings.name(tree.name))
+    root = ElementTree.Element("mujoco", model=settings.name("model", tree.name))
     ElementTree.SubElement(root, "compiler", angle="radian", autolimits="true")
     gravity = {"gravity": numbers(tree.geometry["gravity"])}
     ElementTree.SubElement(root, "option", gravity | dict(settings.option))
     nodes = {BASE: ElementTree.SubElement(root, "worldbody")}
     for body in tree.bodies:
         place = inverse(tree.zero[body.parent]) @ body.zero
-        node = add_body(nodes[body.parent], settings.name(body.name), place)
+        node = add_body(nodes[body.parent], settings.name("link", body.name), place)
         for i, freedom in enumerate(body.freedoms):
-            _joint(node, settings.name(joint_name(body, i)), freedom)
+            _joint(node, settings.name("joint", joint_name(body, i)), freedom)
         _inertial(node, body.center, settings.inertial(body))
         nodes[body.name] = node
     equalities = ElementTree.SubElement(root, "equality")
@@ -116,11 +116,11 @@ def _close(
     if joint.kind == "U":
         # A body of hardly any mass, whose pairs of points then lie on the other axis.
         name = cross_name(joint)
-        first = add_body(first, settings.name(name), joint.frames[0])
-        _joint(first, settings.name(f"{name} 0"), joint.freedoms[0])
+        first = add_body(first, settings.name("link", name), joint.frames[0])
+        _joint(first, settings.name("joint", f"{name} 0"), joint.freedoms[0])
         _inertial(first, POINT, settings.light)
     for k, points in enumerate(_pairs(joint, scale)):
-        names = [settings.name(f"{joint.name} {k} {side}") for side in (0, 1)]
+        names = [settings.name("site", f"{joint.name} {k} {side}") for side in (0, 1)]
         for node, name, point in zip((first, second), names, points, strict=True):
             ElementTree.SubElement(node, "site", name=name, pos=numbers(point))
         sites = {"site1": names[0], "site2": names[1]}
