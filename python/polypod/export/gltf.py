@@ -63,7 +63,7 @@ def glb(mech: Mechanism, poses: Array, time: Array | None = None) -> tuple[bytes
     if not placed.all():
         notes.append(f"{np.sum(~placed)} instants without a place for each link are left out.")
     frames = found.frames[placed]
-    known = found.turn_known[placed].all(axis=0).tolist()
+    known = np.atleast_1d(found.turn_known[placed].all(axis=0))
     free = [link.name for link, turns in zip(links, known, strict=True) if not turns]
     if free:
         notes.append(f"how these turn about their own line is not known and drawn anyhow: {', '.join(free)}.")
@@ -94,8 +94,9 @@ def glb(mech: Mechanism, poses: Array, time: Array | None = None) -> tuple[bytes
     return _bytes(scene, buffer_postprocessor=partial(_animate, tracks, time[placed])), notes
 
 
-def mesh_glb(mesh: trimesh.Trimesh, name: str) -> bytes:
-    """A GLB file of one mesh in base axes, m, with the colours that it has."""
+def mesh_glb(mesh: trimesh.Trimesh, colors: NDArray[np.uint8], name: str) -> bytes:
+    """A GLB file of one mesh in base axes, m, with colours (v, 3) of its vertices."""
+    mesh = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False, vertex_colors=_linear(colors))
     scene: Any = trimesh.Scene(base_frame=_unused("scene", {name}))
     scene.graph.update(name, matrix=Y_UP)
     scene.add_geometry(mesh, f"{name}/mesh", f"{name}/mesh", name)
@@ -135,13 +136,18 @@ def _unused(name: str, taken: set[str]) -> str:
     return found
 
 
+def _linear(srgb: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """Colours as glTF counts them, by light, from the steps of a display; both from 0 to 255."""
+    part = srgb / 255.0
+    light = np.where(part <= 0.04045, part / 12.92, ((part + 0.055) / 1.055) ** 2.4)
+    return np.asarray(np.round(255.0 * light), np.uint8)
+
+
 def _shaded(piece: Piece) -> trimesh.Trimesh:
     """A piece in its colour, with round faces that look round."""
     mesh: trimesh.Trimesh = trimesh.graph.smooth_shade(piece.mesh, angle=SHARP, facet_minarea=None)
-    srgb = np.array([int(piece.color[i : i + 2], 16) for i in (1, 3, 5)]) / 255.0
-    # glTF's factors count light, not the steps of a display.
-    linear = np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)
-    color = [*(round(255.0 * part) for part in linear.tolist()), 255]
+    srgb = np.array([int(piece.color[i : i + 2], 16) for i in (1, 3, 5)], np.uint8)
+    color = [*_linear(srgb).tolist(), 255]
     visual: Any = trimesh.visual
     material = visual.material.PBRMaterial(
         name=piece.color, baseColorFactor=color, metallicFactor=0.1, roughnessFactor=0.6

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from polypod import _core
-from polypod.export.names import Names
+from polypod.export.names import Names, printable
 from polypod.mechanism import Mechanism
 from polypod.multibody.closing import ClosingJoint, closing_joints
 from polypod.multibody.mjcf import cross_name, joint_name
@@ -96,7 +96,7 @@ class Model:
         renamed = [f"{given} is {name}" for given, name in self.names.changed("link").items()]
         if renamed:
             facts.append(f"Names: {'; '.join(renamed)}.")
-        return "\n".join([*facts, *(f"Note: {note}" for note in notes)])
+        return "\n".join(map(printable, [*facts, *(f"Note: {note}" for note in notes)]))
 
 
 def _labels(tree: Multibody, closing: Sequence[ClosingJoint]) -> dict[tuple[str, str], str]:

@@ -46,11 +46,15 @@ def legal(name: str) -> str:
 
 
 def add_comment(root: ElementTree.Element, text: str) -> None:
-    """A comment as the first thing in an element; what XML forbids in comments is written otherwise."""
-    safe = "".join(c if c == "\n" or c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in text)
-    while "--" in safe:
-        safe = safe.replace("--", "- -")
-    root.insert(0, ElementTree.Comment(f"\n{safe}\n"))
+    """A comment as the first thing in an element; two hyphens, which XML forbids in it, are set apart."""
+    while "--" in text:
+        text = text.replace("--", "- -")
+    root.insert(0, ElementTree.Comment(f"\n{text}\n"))
+
+
+def printable(text: str) -> str:
+    """One line of text without characters that XML or YAML forbid."""
+    return "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in text)
 
 
 def xml(root: ElementTree.Element) -> str:
