@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import sys
 from pathlib import Path
 
@@ -24,7 +25,9 @@ NASTY = {"1": "a/b", "2": "a b", "3": "a_b", "4": "αβ-->", "5": '<5 & "6">'}
 """Names of legs that no format takes, and that become the same."""
 
 
+@functools.cache
 def mechanism(name):
+    """By name; never changed."""
     if name == LU:
         return pp.load(name)
     if name == "massless":
@@ -60,7 +63,7 @@ def regular_pose(mech):
     return mech.pose({"alpha": 0.1, "p": -0.30, "h": 0.62, "beta": 0.7, "gamma": 0.6})
 
 
-def nearby_poses(mech, count=3):
+def nearby_poses(mech, count=2):
     """Poses about the regular one, with all constraints kept."""
     rng = np.random.default_rng(7)
     start = mech.inverse_kinematics(regular_pose(mech)).lengths

@@ -12,12 +12,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import trimesh
 import yaml
 
 import polypod as pp
+from polypod.bodies import links_of
 from polypod.export import export
 from polypod.export.mjcf import STEP, holding_forces
 from polypod.export.model import Model
+from polypod.export.shapes import body_name
 
 sys.path.insert(0, str(Path(__file__).parent))
 from exported import LU, MECHANISMS, bodies, mechanism, nasty, nearby_poses, places, regular_pose
@@ -133,6 +136,26 @@ def test_mujoco_has_limits_and_motors(name, tmp_path):
     assert np.degrees(turn.range) == pytest.approx([-20.0, 30.0])
     assert model.actuator("leg_1").ctrlrange == pytest.approx([-100.0, 250.0])
     assert model.nu == mech.actuated.sum()
+
+
+@pytest.mark.parametrize("name", [LU, "fpu"])
+def test_mujoco_has_the_meshes_in_place(name, tmp_path):
+    mech = mechanism(name)
+    mujoco, model, data, _ = in_mujoco(mech, tmp_path / "m.xml")
+    mujoco.mj_forward(model, data)
+    frames, _ = places(mech, mech.home)
+    for link in links_of(mech):
+        body = body_name(mech, link)
+        pieces = [trimesh.transform_points(piece.mesh.vertices, frames[body]) for piece in link.pieces]
+        number = 0 if body == "base" else model.body(legal(mech)[body]).id
+        seen = []
+        for geom in np.flatnonzero(model.geom_bodyid == number):
+            mesh = model.mesh(model.geom_dataid[geom])
+            vertices = model.mesh_vert[mesh.vertadr[0] : mesh.vertadr[0] + mesh.vertnum[0]]
+            seen.append(vertices @ data.geom_xmat[geom].reshape(3, 3).T + data.geom_xpos[geom])
+        for end in (np.min, np.max):
+            expected = end(np.concatenate(pieces), axis=0)
+            assert np.allclose(end(np.concatenate(seen), axis=0), expected, rtol=0.0, atol=1e-6), body
 
 
 @pytest.mark.parametrize("look", ["meshes", "simple"])
@@ -314,6 +337,13 @@ def test_pinocchio_shows_the_meshes(tmp_path):
     assert seen.ngeoms == len(found.files) - 2
     at_home = {model.frames[entry.parentFrame].name for entry in seen.geometryObjects}
     assert at_home == {*legal(mech).values()}
+    for link in links_of(mech):
+        name = legal(mech)[body_name(mech, link)]
+        files = [trimesh.load(file) for file in found.files if file.name.startswith(f"{name}_mesh_")]
+        assert all(mesh.is_watertight for mesh in files)
+        volume = sum(piece.mesh.volume for piece in link.pieces)
+        assert sum(mesh.volume for mesh in files) == pytest.approx(volume, rel=1e-4)
+        assert len({piece.color for piece in link.pieces}) == len(files)
 
 
 def test_pinocchio_takes_nasty_names(tmp_path):
@@ -372,7 +402,7 @@ def frame_of(numbers):
 @each
 def test_sdformat_finds_links(name, sdformat, tmp_path):
     mech = mechanism(name)
-    export(mech, tmp_path / "m.sdf")
+    export(mech, tmp_path / "m.sdf", look="simple")
     found = sdformat(tmp_path / "m.sdf")
     names, light = legal(mech), Model(mech).light
     assert found["links"].keys() == {*names.values()}
