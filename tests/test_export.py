@@ -19,7 +19,7 @@ import polypod as pp
 from polypod.bodies import link_frames, links_of
 from polypod.export import FORMATS, export
 from polypod.export.gltf import Y_UP
-from polypod.export.model import LIGHT, Model
+from polypod.export.model import LIGHT, THIN, Model
 from polypod.export.names import Names, legal
 from polypod.solution import states_along
 
@@ -110,7 +110,7 @@ def test_nasty_names_make_sound_files(name, tmp_path):
 def test_light_masses_are_those_of_nothing_else():
     model = Model(mechanism("massless"))
     heaviest = model.mech.geometry["platform"]["mass"]
-    assert model.light[0] == LIGHT * heaviest
+    assert (model.light[0], model.thin[0]) == (LIGHT * heaviest, THIN * heaviest)
     assert len(model.massless) == 12
     tables = model.mech.to_dict()
     tables.pop("platform")

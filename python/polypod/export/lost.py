@@ -40,7 +40,7 @@ def lost(model: Model, limits: Collection[str], *, gravity: bool) -> list[str]:
     notes += _limits(model, limits)
     if model.massless:
         notes.append(
-            f"links that have no mass in the mechanism file have {model.light[0]:g} kg here, because engines "
+            f"links that have no mass in the mechanism file have {model.thin[0]:g} kg here, because engines "
             f"divide by masses: {', '.join(model.massless)}."
         )
     mobility = model.mech.mobility()

@@ -15,13 +15,17 @@ from polypod.export.names import Names, printable
 from polypod.mechanism import Mechanism
 from polypod.multibody.closing import ClosingJoint, closing_joints
 from polypod.multibody.mjcf import cross_name, joint_name
+from polypod.multibody.placement import PLATFORM
 from polypod.multibody.tree import Body, LegParts, Multibody, describe
 
 Array = NDArray[np.float64]
 
 LIGHT = 1e-6
-"""Mass of a link that has none in the mechanism, as a part of the heaviest link's: engines divide by masses.
-Its moments of inertia are that mass times the square of the characteristic length."""
+"""Mass of a body between two axes of a joint, as a part of the heaviest link's: engines divide by masses. Its
+moments of inertia are that mass times the square of the characteristic length."""
+THIN = 1e-4
+"""The same for a link that has no mass in the mechanism: loops that are springs hold with the mass of what
+they tie, so that lighter legs let a heavy platform sink, and shake."""
 MASSLESS = 1.0
 """kg: what stands for the heaviest link where no link has a mass."""
 
@@ -45,13 +49,21 @@ class Model:
 
     @cached_property
     def light(self) -> tuple[float, Array]:
-        """Mass, kg, and inertia (3, 3), kg m^2, of links without mass and of what only joins two axes."""
-        mass = LIGHT * (max(body.mass for body in self.tree.bodies) or MASSLESS)
+        """Mass, kg, and inertia (3, 3), kg m^2, of what only joins two axes."""
+        return self._part_of_heaviest(LIGHT)
+
+    @cached_property
+    def thin(self) -> tuple[float, Array]:
+        """Mass, kg, and inertia (3, 3), kg m^2, of links that have none in the mechanism."""
+        return self._part_of_heaviest(THIN)
+
+    def _part_of_heaviest(self, part: float) -> tuple[float, Array]:
+        mass = part * (max(body.mass for body in self.tree.bodies) or MASSLESS)
         return mass, mass * self.tree.scale**2 * np.eye(3)
 
     def inertial(self, body: Body) -> tuple[float, Array]:
-        """Mass and inertia about the mass centre as the mechanism has them, or the light ones."""
-        return (body.mass, body.inertia) if body.mass > 0.0 else self.light
+        """Mass and inertia about the mass centre as the mechanism has them, or the thin ones."""
+        return (body.mass, body.inertia) if body.mass > 0.0 else self.thin
 
     @property
     def massless(self) -> list[str]:
@@ -103,6 +115,8 @@ def _labels(tree: Multibody, closing: Sequence[ClosingJoint]) -> dict[tuple[str,
     """What joints and crosses are called instead of their names in the multibody description."""
     labels: dict[tuple[str, str], str] = {}
     bodies = {body.name: body for body in tree.bodies}
+    labels |= {("joint", joint_name(bodies[rod], 0)): f"{rod} turn" for rod in tree.rods}
+    labels["joint", joint_name(bodies[PLATFORM], 0)] = "platform free"
     for leg, joint in zip(tree.legs, closing, strict=True):
         cylinder, piston = bodies[leg.cylinder], bodies[leg.piston]
         for i in range(len(cylinder.freedoms)):

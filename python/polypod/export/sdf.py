@@ -67,7 +67,10 @@ def _add_tree_joint(node: ElementTree.Element, model: Model, body: Body) -> None
     name = f"{body.name} joint"
     for i, leg in enumerate(model.tree.legs):
         if body.name == leg.piston:
-            name, efforts = f"leg {leg.name} slide", [effort(model, i) if leg.actuated else 0.0]
+            # No effort is no limit; a passive leg has none to give.
+            limited = model.force_of(i) is not None
+            greatest = effort(model, i) if limited else None
+            name, efforts = f"leg {leg.name} slide", [greatest if leg.actuated else 0.0]
         elif body.name == leg.cylinder:
             name = f"leg {leg.name} base joint"
     _add_joint(
