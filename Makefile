@@ -14,6 +14,9 @@ export PIP_DISABLE_PIP_VERSION_CHECK := 1
 # The other kind of processor whose registers are used.
 ARM := aarch64-unknown-linux-gnu
 
+# Debian's packages that tests use: a browser, and the reader of SDF files.
+DEBIAN := chromium libsdformat-dev pkg-config
+
 # On CI the locked crates and no others.
 LOCKED := $(if $(CI),--locked)
 
@@ -24,7 +27,7 @@ RUST := Cargo.toml $(wildcard Cargo.lock) $(shell find crates -name target -prun
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help demo test test-all test-rust lint bench docs wheel lock clean
+.PHONY: help demo test test-all test-rust tools lint bench docs wheel lock clean
 
 help: ## list the targets
 	@awk 'BEGIN { FS = ":.*## " } /^[a-z-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' Makefile
@@ -32,12 +35,19 @@ help: ## list the targets
 demo: $(BUILT) ## analyse the published manipulator: tables and figures into demo/
 	$(BIN)/polypod demo -o demo
 
-test: test-rust $(BUILT) ## Rust and Python tests, without the slow ones
+test: test-rust tools $(BUILT) ## Rust and Python tests, without the slow ones
 	$(BIN)/python -m pytest
 
-test-all: $(BUILT) ## all tests, the slow ones too
+test-all: tools $(BUILT) ## all tests, the slow ones too
 	cargo test $(LOCKED) -p polypod-core -- --include-ignored
 	$(BIN)/python -m pytest -m "" -n auto
+
+tools: ## what some tests use beside Python and Rust; on Debian, as root, it is installed
+	@if ! command -v dpkg-query apt-get >/dev/null; \
+	then echo "no Debian: tests that need $(DEBIAN) are left out"; \
+	elif [ -z "$$(dpkg-query -Wf '$${db:Status-Status}\n' $(DEBIAN) 2>&1 | grep -vx installed)" ]; then :; \
+	elif [ "$$(id -u)" = 0 ]; then apt-get update -qq && apt-get install -qq -y --no-install-recommends $(DEBIAN) >/dev/null; \
+	else echo "tests that need them are left out; to have them: sudo apt-get install $(DEBIAN)"; fi
 
 test-rust:
 	cargo test $(LOCKED) -p polypod-core

@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import csv
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -152,7 +153,7 @@ def test_rows_without_pose_give_exit_status_1(run, mech, path):
 def test_a_row_whose_modes_may_be_incomplete_gives_exit_status_1(run, mech, path, monkeypatch):
     find = pp.Mechanism.assembly_modes
     incomplete = np.array([pp.Status.NOT_CONVERGED], dtype=np.uint8)
-    monkeypatch.setattr(pp.Mechanism, "assembly_modes", lambda *a: find(*a)._replace(status=incomplete))
+    monkeypatch.setattr(pp.Mechanism, "assembly_modes", lambda *a: replace(find(*a), status=incomplete))
     write(path, mech.inverse_kinematics(poses(mech)).lengths)
     status, out, _ = run("fk", NAME, path)
     assert status == 1

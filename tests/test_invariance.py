@@ -124,8 +124,8 @@ def chain(mech: pp.Mechanism, states: States) -> dict[str, Array]:
     results: dict[str, Array] = {}
     for part in (mech.kinematics(*motion), mech.inverse_dynamics(*motion), mech.power(*motion)):
         assert np.isin(part.status, (Status.OK, Status.OUT_OF_STROKE)).all()
-        results |= part._asdict()
-    results |= mech.conditioning(states.pose)._asdict() | {"status": results["status"]}
+        results |= part.arrays
+    results |= mech.conditioning(states.pose).arrays | {"status": results["status"]}
     limits = mech.limits(states.pose, twist=states.twist, acceleration=states.acceleration)
     results["relative slack"] = limits.relative
     powers = [
@@ -322,7 +322,8 @@ def test_order_of_the_legs(tables: Tables) -> None:
     mech = mechanism(tables)
     states = states_of(mech)
     expected = chain(mech, states)
-    for name in (*mech.kinematics(states.pose, states.twist, states.acceleration)._fields[:18], "forces"):
+    kinematics = mech.kinematics(states.pose, states.twist, states.acceleration)
+    for name in (*list(kinematics.arrays)[:18], "forces"):
         expected[name] = expected[name][:, order]
     if tables["name"] == "3-rps":
         expected["constraint"] = expected["constraint"][:, order]

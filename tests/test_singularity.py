@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import json
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -75,7 +76,7 @@ def test_determinant_and_singular_values_are_those_of_the_independent_model(name
     assert found.sigma_max == pytest.approx(sigma[:, 0], rel=1e-9)
     assert found.sigma_min == pytest.approx(sigma[:, -1], rel=1e-7, abs=1e-11)
     assert np.array_equal(found.condition, found.sigma_max / found.sigma_min)
-    for field, value in mech.conditioning(matrix(pose), length=length)._asdict().items():
+    for field, value in mech.conditioning(matrix(pose), length=length).arrays.items():
         assert np.array_equal(value, getattr(found, field)), field
     assert np.array_equal(mech.determinant(matrix(pose), length=length).determinant, found.determinant)
 
@@ -429,7 +430,7 @@ class Blind:
 
     def state(self, *args, **kwargs):
         state = self._mech.state(*args, **kwargs)
-        return state._replace(pose=np.full_like(state.pose, np.nan), twist=np.full_like(state.twist, np.nan))
+        return replace(state, pose=np.full_like(state.pose, np.nan), twist=np.full_like(state.twist, np.nan))
 
 
 def test_a_change_of_sign_across_a_gap_is_told():

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -283,7 +284,7 @@ def test_states_without_answer(engine):
 def test_wrong_forces_are_found(monkeypatch, engine):
     mech, states = lu_states([1.3])
     right = pp.Mechanism.inverse_dynamics
-    wrong = lambda *args: (a := right(*args))._replace(forces=a.forces * (1 + 1e-6))  # noqa: E731
+    wrong = lambda *args: replace((a := right(*args)), forces=a.forces * (1 + 1e-6))  # noqa: E731
     monkeypatch.setattr(pp.Mechanism, "inverse_dynamics", wrong)
     assert "platform_acceleration" in exceeding(verify_states(mech, *states, engines=[engine]))
 
@@ -342,7 +343,7 @@ def test_a_motion_under_wrong_forces_does_not_come_out(monkeypatch, fault):
         answer = right(*args)
         late = np.roll(answer.forces, 1, axis=0)
         late[0] = late[1]
-        return answer._replace(forces=answer.forces * (1 + 1e-5) if fault == "forces" else late)
+        return replace(answer, forces=answer.forces * (1 + 1e-5) if fault == "forces" else late)
 
     monkeypatch.setattr(pp.Mechanism, "inverse_dynamics", wrong)
     found = integrate(mech, short_motion(mech, 0.25), steps=(10, 20, 40))

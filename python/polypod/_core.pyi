@@ -10,6 +10,7 @@ _Array = NDArray[np.float64]
 _Table = dict[str, NDArray[Any]]
 
 __all__ = [
+    "Axes",
     "Chart",
     "Faults",
     "Flood",
@@ -37,6 +38,11 @@ class Faults(Exception):
     """All faults of a mechanism as (place, message)."""
 
 @final
+class Axes:
+    def __new__(cls, axes: list[tuple[int, ...]]) -> Axes: ...
+    def fit(self, arguments: tuple[Any, ...]) -> bool: ...
+
+@final
 class Mechanism:
     def __new__(cls, spec: str) -> Mechanism: ...
     @property
@@ -53,7 +59,7 @@ class Mechanism:
         self,
         set: str,
         given: list[list[_Array] | None],
-        count: int,
+        batch: Sequence[int],
         branch: float,
         guess: _Array | None,
         continued: bool,

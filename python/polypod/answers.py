@@ -1,22 +1,28 @@
 """What a mechanism answers: named arrays over a batch of states, SI, base axes; and its mobility.
 
 The shapes are written with n legs, k rods or constraints, and `...` for the batch. Every answer has a
-`Status` per state.
+`Status` per state, knows the mechanism that was asked, and goes to xarray by `to_xarray`.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
+
+from polypod.labelled import Answer, Quantity, whole_rows
+from polypod.notebook import Rows, numbers
+from polypod.variables import COMPONENTS, variable
 
 Array = NDArray[np.float64]
 Codes = NDArray[np.uint8]
 
 
-class State(NamedTuple):
+@dataclass(eq=False, repr=False)
+class State(Answer):
     """A platform's motion, and all numbers of its coordinate set."""
 
     pose: Array
@@ -31,8 +37,38 @@ class State(NamedTuple):
     coordinate_second_rates: dict[str, Array]
     status: Codes
 
+    _variables: ClassVar = {
+        "pose": "pose",
+        "twist": "twist",
+        "acceleration": "acceleration",
+        "status": "status",
+    }
 
-class InverseKinematics(NamedTuple):
+    def quantities(self) -> list[Quantity]:
+        """Pose, twist and acceleration, then the coordinates with their rates and second rates."""
+        series = {
+            "coordinate_": self.coordinates,
+            "coordinate_rate_": self.coordinate_rates,
+            "coordinate_second_rate_": self.coordinate_second_rates,
+        }
+        columns = {prefix + name: column for prefix, of in series.items() for name, column in of.items()}
+        found = super().quantities()
+        return found + [Quantity(name, name, variable(name), column) for name, column in columns.items()]
+
+    def _tables(self) -> list[Rows]:
+        """Coordinates as rows."""
+        motion = (self.coordinates, self.coordinate_rates, self.coordinate_second_rates)
+        headers = ("coordinate", "value", "rate", "second rate")
+        rows = []
+        for name in self.coordinates:
+            unit = variable(f"coordinate_{name}").unit
+            values = (numbers(of[name]) if name in of else "" for of in motion)
+            rows.append((f"{name} / {unit}" if unit != "1" else name, *values))
+        return [Rows(headers, rows), whole_rows(super().quantities()[:3])]
+
+
+@dataclass(eq=False, repr=False)
+class InverseKinematics(Answer):
     """Legs at a pose [Eq. 3]."""
 
     lengths: Array
@@ -43,8 +79,16 @@ class InverseKinematics(NamedTuple):
     """(..., n, 3): δ."""
     status: Codes
 
+    _variables: ClassVar = {
+        "lengths": "length",
+        "vectors": "leg_vector",
+        "directions": "direction",
+        "status": "status",
+    }
 
-class ForwardKinematics(NamedTuple):
+
+@dataclass(eq=False, repr=False)
+class ForwardKinematics(Answer):
     """The platform for given leg lengths [T25-T27]."""
 
     pose: Array
@@ -55,8 +99,16 @@ class ForwardKinematics(NamedTuple):
     """(...): Newton steps."""
     status: Codes
 
+    _variables: ClassVar = {
+        "pose": "pose",
+        "residual": "pose_error",
+        "iterations": "iterations",
+        "status": "status",
+    }
 
-class AssemblyModes(NamedTuple):
+
+@dataclass(eq=False, repr=False)
+class AssemblyModes(Answer):
     """All real poses for given leg lengths, highest first [T28]; NaN beyond `number`."""
 
     pose: Array
@@ -76,8 +128,24 @@ class AssemblyModes(NamedTuple):
     status: Codes
     """(...): SINGULAR where modes meet, NOT_CONVERGED where one may be missing."""
 
+    _variables: ClassVar = {
+        "pose": "mode_pose",
+        "number": "mode_number",
+        "determinant_sign": "mode_sign",
+        "above": "mode_above",
+        "multiplicity": "mode_multiplicity",
+        "residual": "mode_error",
+        "mode_status": "mode_status",
+        "status": "status",
+    }
 
-class Kinematics(NamedTuple):
+    def labels(self) -> dict[str, Sequence[int]]:
+        """The modes, from 1."""
+        return {"mode": range(1, self.pose.shape[-3] + 1)}
+
+
+@dataclass(eq=False, repr=False)
+class Kinematics(Answer):
     """Motion of legs, rods, links and joints [Eq. 2-39], base axes, SI."""
 
     lengths: Array
@@ -125,8 +193,34 @@ class Kinematics(NamedTuple):
     status: Codes
     """(...): `Status`."""
 
+    _variables: ClassVar = {
+        "lengths": "length",
+        "rates": "rate",
+        "accelerations": "leg_acceleration",
+        "directions": "direction",
+        "leg_omega": "leg_omega",
+        "leg_eps": "leg_eps",
+        "leg_spin": "leg_spin",
+        "leg_spin_rate": "leg_spin_rate",
+        "piston_velocity": "piston_velocity",
+        "piston_acceleration": "piston_acceleration",
+        "cylinder_velocity": "cylinder_velocity",
+        "cylinder_acceleration": "cylinder_acceleration",
+        "base_joint_angles": "base_joint_angle",
+        "base_joint_rates": "base_joint_rate",
+        "platform_joint_angles": "platform_joint_angle",
+        "platform_joint_rates": "platform_joint_rate",
+        "base_cone_angle": "base_cone_angle",
+        "platform_cone_angle": "platform_cone_angle",
+        "rod_angle": "rod_angle",
+        "rod_omega": "rod_omega",
+        "rod_eps": "rod_eps",
+        "status": "status",
+    }
 
-class InverseDynamics(NamedTuple):
+
+@dataclass(eq=False, repr=False)
+class InverseDynamics(Answer):
     """What balances a motion [Eq. 43]."""
 
     forces: Array
@@ -135,8 +229,15 @@ class InverseDynamics(NamedTuple):
     """(..., k): multipliers of the independent constraints; f_c in N for the paper's mechanism."""
     status: Codes
 
+    _variables: ClassVar = {
+        "forces": "force",
+        "constraint": "constraint",
+        "status": "status",
+    }
 
-class ForwardDynamics(NamedTuple):
+
+@dataclass(eq=False, repr=False)
+class ForwardDynamics(Answer):
     """What forces do to the platform [T49]."""
 
     acceleration: Array
@@ -146,8 +247,15 @@ class ForwardDynamics(NamedTuple):
     status: Codes
     """SINGULAR where the constraints depend on one another; actuators need not control the platform."""
 
+    _variables: ClassVar = {
+        "acceleration": "acceleration",
+        "constraint": "constraint",
+        "status": "status",
+    }
 
-class EquationsOfMotion(NamedTuple):
+
+@dataclass(eq=False, repr=False)
+class EquationsOfMotion(Answer):
     """The terms of M q'' + C q' + D q' + g = Jᵀ f + Sᵀ W/η in d velocities q' of the platform [T49-T52].
 
     In platform space q' is the twist V, and the multipliers of the constraints push, too:
@@ -173,8 +281,25 @@ class EquationsOfMotion(NamedTuple):
     """(..., d): q' of the twist."""
     status: Codes
 
+    _variables: ClassVar = {
+        "mass": "mass_matrix",
+        "coriolis": "coriolis_matrix",
+        "damping": "damping_matrix",
+        "gravity": "gravity_forces",
+        "twist_jacobian": "twist_jacobian",
+        "leg_jacobian": "leg_jacobian",
+        "rates": "coordinate_rates",
+        "status": "status",
+    }
 
-class CoupledForces(NamedTuple):
+    def labels(self) -> dict[str, Sequence[str]]:
+        """The coordinates; the components of the twist in platform space."""
+        names = self.coordinates or COMPONENTS
+        return {"coordinate": names, "by_coordinate": names}
+
+
+@dataclass(eq=False, repr=False)
+class CoupledForces(Answer):
     """Forces of two legs on one rod, and the torque on the rod [T16]."""
 
     legs: tuple[str, str]
@@ -186,6 +311,16 @@ class CoupledForces(NamedTuple):
     torque: Array
     """(...): T_c about the rod's line, N m."""
     status: Codes
+
+    _variables: ClassVar = {
+        "forces": "coupled_force",
+        "torque": "coupled_torque",
+        "status": "status",
+    }
+
+    def labels(self) -> dict[str, Sequence[str]]:
+        """The two legs."""
+        return {"coupled_leg": self.legs}
 
 
 @dataclass(frozen=True)
@@ -200,7 +335,8 @@ class Joint:
     """The link on the base's side, which acts, and that on the platform's, which is acted on."""
 
 
-class JointReactions(NamedTuple):
+@dataclass(eq=False, repr=False)
+class JointReactions(Answer):
     """What joints do to links [T44-T48]; j joints: rods first, then each leg's from base to platform.
 
     A reaction is the wrench (F, T), N and N m, of the link on the base's side on that on the platform's, with
@@ -237,8 +373,22 @@ class JointReactions(NamedTuple):
     """
     status: Codes
 
+    _variables: ClassVar = {
+        "points": "joint_point",
+        "axes": "joint_axes",
+        "reactions": "reaction",
+        "reactions_in_joint": "reaction_in_joint",
+        "least": "least_reaction",
+        "least_in_joint": "least_reaction_in_joint",
+        "determinate": "determinate_in_base",
+        "determinate_in_joint": "reaction_determinate",
+        "constraint_wrench": "constraint_wrench",
+        "status": "status",
+    }
 
-class Power(NamedTuple):
+
+@dataclass(eq=False, repr=False)
+class Power(Answer):
     """Energies and powers of a motion [T17]; W and J."""
 
     kinetic: Array
@@ -261,8 +411,22 @@ class Power(NamedTuple):
     """actuators + load + damping + friction - kinetic_rate - potential_rate: zero up to rounding."""
     status: Codes
 
+    _variables: ClassVar = {
+        "kinetic": "kinetic_energy",
+        "potential": "potential_energy",
+        "kinetic_rate": "kinetic_rate",
+        "potential_rate": "potential_rate",
+        "actuators": "actuator_power",
+        "load": "load_power",
+        "damping": "damping_power",
+        "friction": "friction_power",
+        "residual": "power_residual",
+        "status": "status",
+    }
 
-class Conditioning(NamedTuple):
+
+@dataclass(eq=False, repr=False)
+class Conditioning(Answer):
     """Singular values of the leg Jacobian on the twists that the constraints allow [T24]; pure numbers."""
 
     sigma_min: Array
@@ -273,8 +437,16 @@ class Conditioning(NamedTuple):
     """(...): their quotient, sigma_max / sigma_min."""
     status: Codes
 
+    _variables: ClassVar = {
+        "sigma_min": "sigma_min",
+        "sigma_max": "sigma_max",
+        "condition": "condition",
+        "status": "status",
+    }
 
-class Limits(NamedTuple):
+
+@dataclass(eq=False, repr=False)
+class Limits(Answer):
     """How far states are from the limits of their mechanism [T35]; m limits in the order of `limit_list`."""
 
     names: tuple[str, ...]
@@ -288,6 +460,14 @@ class Limits(NamedTuple):
     within: NDArray[np.bool_]
     """(...): whether no limit is passed; False where a margin is NaN or the state has no answer."""
     status: Codes
+
+    _variables: ClassVar = {
+        "margins": "limit_margin",
+        "relative": "limit_relative",
+        "binding": "binding_limit",
+        "within": "within_limits",
+        "status": "status",
+    }
 
 
 @dataclass(frozen=True)
@@ -362,3 +542,8 @@ class Mobility:
     graph_links: tuple[GraphLink, ...]
     graph_joints: tuple[GraphJoint, ...]
     published: Published | None
+
+    def _repr_html_(self) -> str:
+        from polypod.cards import of_mobility
+
+        return of_mobility(self)

@@ -5,17 +5,21 @@ The shapes are written with n legs, k multipliers, m coordinates, p parameters, 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
+
+from polypod.labelled import Answer
 
 Array = NDArray[np.float64]
 Codes = NDArray[np.uint8]
 
 
-class InverseDynamicsDerivatives(NamedTuple):
+@dataclass(eq=False, repr=False)
+class InverseDynamicsDerivatives(Answer):
     """Exact derivatives of active forces and multipliers [T56, T57]; the last axis is what is varied.
 
     By pose: m for a move of o, rad for a turn about axes of the base through o, whose components twist and
@@ -77,8 +81,38 @@ class InverseDynamicsDerivatives(NamedTuple):
     status: Codes
     """FOLD where the coordinates do not determine the motion: all other derivatives stand."""
 
+    _variables: ClassVar = {
+        "forces_by_pose": "forces_by_pose",
+        "constraint_by_pose": "constraint_by_pose",
+        "forces_by_twist": "forces_by_twist",
+        "constraint_by_twist": "constraint_by_twist",
+        "forces_by_acceleration": "forces_by_acceleration",
+        "constraint_by_acceleration": "constraint_by_acceleration",
+        "forces_by_coordinates": "forces_by_coordinates",
+        "constraint_by_coordinates": "constraint_by_coordinates",
+        "forces_by_rates": "forces_by_rates",
+        "constraint_by_rates": "constraint_by_rates",
+        "forces_by_second_rates": "forces_by_second_rates",
+        "constraint_by_second_rates": "constraint_by_second_rates",
+        "forces_by_bodies": "forces_by_bodies",
+        "constraint_by_bodies": "constraint_by_bodies",
+        "forces_by_geometry": "forces_by_geometry",
+        "constraint_by_geometry": "constraint_by_geometry",
+        "lengths_by_geometry": "lengths_by_geometry",
+        "status": "status",
+    }
 
-class Regressor(NamedTuple):
+    def labels(self) -> dict[str, Sequence[str]]:
+        """What is varied."""
+        return {
+            "coordinate": self.coordinates,
+            "body_parameter": self.bodies,
+            "geometry_parameter": self.geometry,
+        }
+
+
+@dataclass(eq=False, repr=False)
+class Regressor(Answer):
     """Active forces and multipliers as linear functions of the inertial parameters [T57].
 
     `inverse_dynamics(...).forces` is `forces @ values + forces_offset`, and so for `constraint`.
@@ -100,9 +134,23 @@ class Regressor(NamedTuple):
     """(..., k)."""
     status: Codes
 
+    _variables: ClassVar = {
+        "values": "parameter_value",
+        "forces": "regressor",
+        "constraint": "constraint_regressor",
+        "forces_offset": "force_offset",
+        "constraint_offset": "constraint_offset",
+        "status": "status",
+    }
+    _same_for_all: ClassVar = frozenset({"values"})
 
-@dataclass(frozen=True)
-class BaseParameters:
+    def labels(self) -> dict[str, Sequence[str]]:
+        """The parameters."""
+        return {"parameter": self.names}
+
+
+@dataclass(eq=False, repr=False)
+class BaseParameters(Answer):
     """The minimal set of inertial parameters: combinations that active forces can tell apart [T58].
 
     With the regressor's names, values and columns: `forces[..., columns] @ values` are the forces of all
@@ -122,6 +170,17 @@ class BaseParameters:
     remainders: Array
     """(p,): what is left of each parameter's column after the ones kept before it, as a part of itself: 0
     where it is dependent. How clear the rank is shows in the gap between both kinds."""
+
+    _variables: ClassVar = {
+        "columns": "base_column",
+        "combination": "combination",
+        "values": "base_value",
+        "remainders": "remainder",
+    }
+
+    def labels(self) -> dict[str, Sequence[str]]:
+        """Base parameters and all parameters."""
+        return {"base_parameter": self.names, "parameter": self.parameters}
 
     def expression(self, index: int, digits: int = 4) -> str:
         """A base parameter as a sum of parameters by name, such as "platform mc_x + 0.14 piston 1 m"."""

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,6 +16,9 @@ from polypod.mechanism import Mechanism
 from polypod.regions import bounds_of, check_threads, start_of
 from polypod.workspace import with_floor
 
+if TYPE_CHECKING:
+    import xarray as xr
+
 Array = NDArray[np.float64]
 Progress = Callable[[int, int], None]
 
@@ -24,7 +28,7 @@ DIVISIONS = 10
 MOST_NODES = 10**9
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class LengthLattice:
     """Positions of o for all combinations of leg lengths in one aspect [T41].
 
@@ -51,6 +55,34 @@ class LengthLattice:
     """(k, 4): least and greatest x, then y, in each layer, m."""
     inputs: dict[str, Any]
     """What it was made from."""
+
+    def __repr__(self) -> str:
+        from polypod.cards import lattice_heading
+
+        return "<{}; {}>".format(*lattice_heading(self))
+
+    def _repr_html_(self) -> str:
+        from polypod.cards import of_lattice
+
+        return of_lattice(self)
+
+    def to_xarray(self) -> xr.Dataset:
+        """Extents, and the profile over the layers of z, as one dataset; counts and inputs as attributes."""
+        import xarray as xr
+
+        about = {
+            "extents": (("axis", "end"), self.extents, "least and greatest coordinate of o"),
+            "layers": (("layer", "end"), self.layers, "lower and upper end of the layer of z"),
+            "profile": (("layer", "across", "end"), self.profile.reshape(-1, 2, 2), "extents in the layer"),
+        }
+        data = {
+            name: (dims, values, {"units": "m", "long_name": text})
+            for name, (dims, values, text) in about.items()
+        }
+        coords = {"axis": ["x", "y", "z"], "across": ["x", "y"], "end": ["least", "greatest"]}
+        counts = {name: getattr(self, name) for name in ("nodes", "inside", "poses", "at_limits", "singular")}
+        attrs = {**counts, "inputs": json.dumps(self.inputs, ensure_ascii=False)}
+        return xr.Dataset(data, coords, {"title": f"Length lattice of {self.inputs['mechanism']}", **attrs})
 
     def widths_above(self, z: float) -> Array:
         """(2,): extents along x and y of the layers whose middle is above z, m; NaN where there is none."""

@@ -6,6 +6,7 @@ import copy
 import json
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
+from functools import cached_property
 from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,7 +17,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from polypod import _core
 from polypod.answers import (
-    Array,
     AssemblyModes,
     Codes,
     Conditioning,
@@ -38,13 +38,13 @@ from polypod.answers import (
     Published,
     State,
 )
+from polypod.arrays import MOTION, MOVING, POSE, Arguments, Array, Loaded, common, doubles, spread
 from polypod.derivatives import BaseParameters, InverseDynamicsDerivatives, Regressor
 from polypod.errors import (
     CoordinateError,
     Fault,
     MechanismError,
     PolypodError,
-    ShapeError,
     UnknownNameError,
     UnsupportedError,
     WorkspaceError,
@@ -67,6 +67,9 @@ if TYPE_CHECKING:
     from polypod.results import Solution
     from polypod.simulation import Input
     from polypod.workspace import Workspace
+
+_AT_REST = np.empty(0)
+"""Twists or accelerations of states that are all at rest."""
 
 
 class Mechanism:
@@ -93,7 +96,16 @@ class Mechanism:
         self.name: str = spec["name"]
         self.leg_names: tuple[str, ...] = tuple(leg["name"] for leg in legs)
         self.rod_names: tuple[str, ...] = tuple(rod["name"] for rod in spec["rods"])
-        self._sets = {name: (tuple(names), given) for name, names, given in self._core.coordinate_sets()}
+        self._limit_names = tuple(limit.name for limit in self.limit_list)
+        self._lengths = Arguments(lengths=(len(legs),))
+        self._guessed_lengths = Arguments(lengths=(len(legs),), guess=(4, 4))
+        self._driven = Arguments(pose=(4, 4), twist=(6,), forces=(len(legs),))
+        sets = self._core.coordinate_sets()
+        self._sets = {set: tuple(names) for set, names, _ in sets}
+        self._given = {
+            set: tuple(names if given is None else (n for n, g in zip(names, given, strict=True) if g))
+            for set, names, given in sets
+        }
 
     # --- files -------------------------------------------------------------------------------------------
 
@@ -136,6 +148,11 @@ class Mechanism:
 
     def __repr__(self) -> str:
         return f"<Mechanism {self.name}: {'+'.join(self.leg_letters)}, {self.dof} freedoms>"
+
+    def _repr_html_(self) -> str:
+        from polypod.cards import of_mechanism
+
+        return of_mechanism(self)
 
     # --- what it is --------------------------------------------------------------------------------------
 
@@ -182,10 +199,7 @@ class Mechanism:
     @property
     def coordinate_sets(self) -> dict[str, tuple[str, ...]]:
         """The names that each coordinate set takes; of the set `pose` any `dof` may be given."""
-        return {
-            set: names if given is None else tuple(n for n, g in zip(names, given, strict=True) if g)
-            for set, (names, given) in self._sets.items()
-        }
+        return dict(self._given)
 
     @property
     def coupled_legs(self) -> tuple[str, str] | None:
@@ -297,7 +311,7 @@ class Mechanism:
         if branch not in (-1, +1):
             raise CoordinateError(f"branch is {branch!r}; must be +1 or -1")
         set = self._set_of(coordinates)
-        names, _ = self._sets[set]
+        names = self._sets[set]
         series: list[Mapping[str, ArrayLike]] = [coordinates, rates or {}, second_rates or {}]
         for extra, kind in zip(series[1:], ("rates", "second_rates"), strict=True):
             for name in extra:
@@ -305,27 +319,22 @@ class Mechanism:
                     raise CoordinateError(
                         f"{kind}: {name!r} is no coordinate given; {alternatives(name, coordinates)}"
                     )
-        flat = [_number(name, s.get(name, 0.0)) for name in coordinates for s in series]
-        guess_array = None if guess is None else _array("guess", guess, (4, 4))
-        shape = _broadcast(*(a.shape for a in flat), () if guess_array is None else guess_array.shape[:-2])
-        columns = iter(_spread(a, shape, ()) for a in flat)
-        by_name = {name: [next(columns) for _ in series] for name in coordinates}
-        table = self._core.states(
+        flat = [doubles(name, s.get(name, 0.0)) for name in coordinates for s in series]
+        guess_array = None if guess is None else doubles("guess", guess, (4, 4))
+        shape = common(*(a.shape for a in flat), () if guess_array is None else guess_array.shape[:-2])
+        rows = iter(spread(a, shape) for a in flat)
+        by_name = {name: [next(rows) for _ in series] for name in coordinates}
+        out = self._core.states(
             set,
             [by_name.get(name) for name in names],
-            int(np.prod(shape)),
+            shape,
             float(branch),
-            None if guess_array is None else _spread(guess_array, shape, (4, 4)),
+            None if guess_array is None else spread(guess_array, (*shape, 4, 4)),
             continued,
         )
-        out = _shaped(table, shape)
-        split = [
-            dict(zip(names, np.moveaxis(out[key], -1, 0), strict=True))
-            for key in ("coordinates", "coordinate_rates", "coordinate_second_rates")
-        ]
-        return State(
-            out["pose"], out["twist"], out["acceleration"], split[0], split[1], split[2], out["status"]
-        )
+        columns = ("coordinates", "coordinate_rates", "coordinate_second_rates")
+        named: dict[str, Any] = {key: _by_name(names, out[key]) for key in columns}
+        return State(self, **out | named)
 
     def coordinates(self, pose: ArrayLike, set: str | None = None) -> dict[str, Array]:
         """All numbers of a coordinate set at a pose, m and rad: the inverse of `pose`.
@@ -335,24 +344,23 @@ class Mechanism:
         set = next(iter(self._sets)) if set is None else set
         if set not in self._sets:
             raise UnknownNameError("coordinate set", set, self._sets)
-        shape, (poses,) = self._batch(pose=(pose, (4, 4)))
-        out = _shaped(self._core.coordinates(set, poses), shape)
-        return dict(zip(self._sets[set][0], np.moveaxis(out["coordinates"], -1, 0), strict=True))
+        (poses,) = POSE(pose)
+        out = self._core.coordinates(set, poses)
+        return _by_name(self._sets[set], out["coordinates"])
 
     def _set_of(self, coordinates: Mapping[str, ArrayLike]) -> str:
         """The set whose given names these are."""
         given = {*coordinates}
-        for set, names in self.coordinate_sets.items():
+        for set, names in self._given.items():
             if given == {*names} or (set == "pose" and given <= {*names} and len(given) == self.dof):
                 return set
-        known = sorted({name for names in self.coordinate_sets.values() for name in names})
+        known = sorted({name for names in self._given.values() for name in names})
         unknown = [
             f"{name!r} is none: {alternatives(str(name), known)}" for name in coordinates if name not in known
         ]
         some = "" if self.dof == 6 else f"{self.dof} independent ones of "
         choices = "; ".join(
-            f"{set}: {some if set == 'pose' else ''}{', '.join(names)}"
-            for set, names in self.coordinate_sets.items()
+            f"{set}: {some if set == 'pose' else ''}{', '.join(names)}" for set, names in self._given.items()
         )
         raise CoordinateError(
             f"{self.name} has no coordinate set with {', '.join(map(str, coordinates)) or 'no names'}; "
@@ -369,47 +377,46 @@ class Mechanism:
         >>> mech.inverse_kinematics(mech.home).lengths.round(4).tolist()
         [0.7487, 0.7441, 0.7487, 0.7544, 0.7544]
         """
-        shape, (poses,) = self._batch(pose=(pose, (4, 4)))
-        return InverseKinematics(**_shaped(self._core.inverse_kinematics(poses), shape))
+        (poses,) = POSE(pose)
+        return InverseKinematics(self, **self._core.inverse_kinematics(poses))
 
     def jacobian(self, pose: ArrayLike) -> Array:
         """(..., 6, 6): J of `J V = (ℓ', 0)`: actuated legs, then independent constraints [Eq. 13].
 
         For any pose, on the constraints or not.
         """
-        shape, (poses,) = self._batch(pose=(pose, (4, 4)))
-        return _shaped(self._core.jacobian(poses), shape)["jacobian"]
+        (poses,) = POSE(pose)
+        return self._core.jacobian(poses)["jacobian"]
 
     def hessian(self, pose: ArrayLike) -> Array:
         """(..., 6, 6, 6): H of `J A + Vᵀ H V = (ℓ'', 0)`, a symmetric layer for each row of J [Eq. 15-19].
 
         For any pose, on the constraints or not.
         """
-        shape, (poses,) = self._batch(pose=(pose, (4, 4)))
-        return _shaped(self._core.hessian(poses), shape)["hessian"]
+        (poses,) = POSE(pose)
+        return self._core.hessian(poses)["hessian"]
 
     def kinematics(self, pose: ArrayLike, twist: ArrayLike, acceleration: ArrayLike) -> Kinematics:
         """Motion of all legs, rods, links and joints [Eq. 2-39].
 
         A twist or acceleration that breaks a constraint has the status OFF_CONSTRAINT and no numbers.
         """
-        shape, states = self._states(pose, twist, acceleration)
-        return Kinematics(**_shaped(self._core.kinematics(*states), shape))
+        states = MOTION(pose, twist, acceleration)
+        return Kinematics(self, **self._core.kinematics(*states))
 
     def platform_twist(self, pose: ArrayLike, rates: ArrayLike) -> tuple[Array, Codes]:
         """The twist (..., 6) that gives the legs these rates (..., n), m/s, and the status [Eq. 13]."""
-        shape, arrays = self._batch(pose=(pose, (4, 4)), rates=(rates, (self.n_legs,)))
-        out = _shaped(self._core.platform_twist(*arrays), shape)
+        arrays = Arguments(pose=(4, 4), rates=(self.n_legs,))(pose, rates)
+        out = self._core.platform_twist(*arrays)
         return out["twist"], out["status"]
 
     def platform_acceleration(
         self, pose: ArrayLike, twist: ArrayLike, accelerations: ArrayLike
     ) -> tuple[Array, Codes]:
         """The acceleration (..., 6) that gives the legs theirs (..., n), and the status [Eq. 19]."""
-        shape, arrays = self._batch(
-            pose=(pose, (4, 4)), twist=(twist, (6,)), accelerations=(accelerations, (self.n_legs,))
-        )
-        out = _shaped(self._core.platform_acceleration(*arrays), shape)
+        wanted = Arguments(pose=(4, 4), twist=(6,), accelerations=(self.n_legs,))
+        arrays = wanted(pose, twist, accelerations)
+        out = self._core.platform_acceleration(*arrays)
         return out["acceleration"], out["status"]
 
     # --- singularities -----------------------------------------------------------------------------------
@@ -420,8 +427,8 @@ class Mechanism:
         `length`, m, is what turns are counted with: an angle is an arc of that radius; by default the
         `characteristic_length`.
         """
-        shape, (poses,) = self._batch(pose=(pose, (4, 4)))
-        return Conditioning(**_shaped(self._core.conditioning(poses, self._length(length)), shape))
+        (poses,) = POSE(pose)
+        return Conditioning(self, **self._core.conditioning(poses, self._length(length)))
 
     def determinant(
         self, pose: ArrayLike, twist: ArrayLike = (0.0,) * 6, *, length: float | None = None
@@ -433,8 +440,8 @@ class Mechanism:
             twist: (..., 6); at rest by default.
             length: what turns are counted with, m; `characteristic_length` by default.
         """
-        shape, (poses, twists) = self._batch(pose=(pose, (4, 4)), twist=(twist, (6,)))
-        return Determinant(**_shaped(self._core.determinant(poses, twists, self._length(length)), shape))
+        poses, twists = MOVING(pose, twist)
+        return Determinant(self, **self._core.determinant(poses, twists, self._length(length)))
 
     def singularity(
         self, pose: ArrayLike, *, length: float | None = None, tolerance: float = TOLERANCE
@@ -459,9 +466,9 @@ class Mechanism:
         """
         if not tolerance >= 0.0:
             raise PolypodError(f"tolerance is {tolerance!r}; must be zero or more")
-        shape, (poses,) = self._batch(pose=(pose, (4, 4)))
-        out = _shaped(self._core.singularity(poses, self._length(length), float(tolerance)), shape)
-        return Singularity(**out | {name: codes(out[name]) for name in ("kind", "leg", "uncontrolled")})
+        (poses,) = POSE(pose)
+        out = self._core.singularity(poses, self._length(length), float(tolerance))
+        return Singularity(self, **out | {name: codes(out[name]) for name in ("kind", "leg", "uncontrolled")})
 
     def singularity_distance(
         self,
@@ -498,20 +505,13 @@ class Mechanism:
         set, named = self._varied_coordinates(set, coordinates)
         if reach is None:
             reach = float(self.inverse_kinematics(self.home).lengths.max())
-        shape, (poses,) = self._batch(pose=(pose, (4, 4)))
-        names, table = self._core.nearest_singular(
+        (poses,) = POSE(pose)
+        names, out = self._core.nearest_singular(
             poses, set, named, self._length(length), _positive("reach", reach)
         )
-        out = _shaped(table, shape)
-        return SingularityDistance(
-            tuple(names),
-            out["value"],
-            out["singular"],
-            np.abs(out["singular"] - out["value"][..., None]),
-            codes(out["kind"]),
-            out["searched"],
-            out["status"],
-        )
+        distance = np.abs(out["singular"] - out["value"][..., None])
+        named_kind = {"kind": codes(out["kind"])}
+        return SingularityDistance(self, coordinates=tuple(names), distance=distance, **out | named_kind)
 
     def _varied_coordinates(
         self, set: str | None, coordinates: Sequence[str] | None
@@ -526,7 +526,7 @@ class Mechanism:
         ):
             raise CoordinateError(
                 f"coordinates {', '.join(named)} are not those of the set {set}: "
-                f"{', '.join(self.coordinate_sets[set])}, {self.dof} of them"
+                f"{', '.join(self._given[set])}, {self.dof} of them"
             )
         return set, named
 
@@ -562,12 +562,11 @@ class Mechanism:
         >>> bool(abs(found.pose - pose).max() < 1e-12)
         True
         """
-        arguments: dict[str, tuple[ArrayLike, tuple[int, ...]]] = {"lengths": (lengths, (self.n_legs,))}
-        if guess is not None:
-            arguments["guess"] = (guess, (4, 4))
-        shape, arrays = self._batch(**arguments)
-        table = self._core.forward_kinematics(arrays[0], arrays[1] if guess is not None else None, continued)
-        return ForwardKinematics(**_shaped(table, shape))
+        if guess is None:
+            (lengths,), guesses = self._lengths(lengths), None
+        else:
+            lengths, guesses = self._guessed_lengths(lengths, guess)
+        return ForwardKinematics(self, **self._core.forward_kinematics(lengths, guesses, continued))
 
     def assembly_modes(self, lengths: ArrayLike) -> AssemblyModes:
         """All real poses with the given leg lengths [T28, T29].
@@ -587,8 +586,8 @@ class Mechanism:
         >>> int(modes.number), pp.Status(int(modes.status)).name
         (8, 'OK')
         """
-        shape, (flat,) = self._batch(lengths=(lengths, (self.n_legs,)))
-        found = self._core.assembly_modes(flat)
+        (lengths,) = self._lengths(lengths)
+        found = self._core.assembly_modes(lengths)
         if found is None:
             raise UnsupportedError(
                 f"{self.name}: assembly modes need as many actuated legs as freedoms and a design that is "
@@ -603,7 +602,9 @@ class Mechanism:
             padded[name] = np.full(present.shape + column.shape[1:], empty, dtype=column.dtype)
             padded[name][present] = column
         padded["mode_status"] = padded.pop("status")
-        return AssemblyModes(**_shaped({**padded, "number": count, "status": status}, shape))
+        batch = lengths.shape[:-1]
+        modes = {name: a.reshape(batch + a.shape[1:]) for name, a in padded.items()}
+        return AssemblyModes(self, **modes, number=count.reshape(batch), status=status.reshape(batch))
 
     # --- workspace ---------------------------------------------------------------------------------------
 
@@ -746,10 +747,10 @@ class Mechanism:
         >>> mech.inverse_dynamics(pose, np.zeros(6), np.zeros(6)).forces.round().tolist()
         [-13151.0, 9809.0, -4907.0, -1993.0, 10231.0]
         """
-        shape, args = self._loaded_states(pose, twist, acceleration, wrench, wrench_axes)
-        return InverseDynamics(**_shaped(self._core.inverse_dynamics(*args), shape))
+        args = MOTION.loaded(wrench, wrench_axes, pose, twist, acceleration)
+        return InverseDynamics(self, **self._core.inverse_dynamics(*args))
 
-    @property
+    @cached_property
     def joint_list(self) -> tuple[Joint, ...]:
         """All joints: the rods' bearings, then each leg's base, prismatic and platform joint [T44]."""
         return tuple(
@@ -791,11 +792,9 @@ class Mechanism:
         >>> answer.determinate_in_joint[3].tolist()
         [True, False, True, True, True, False]
         """
-        shape, args = self._loaded_states(pose, twist, acceleration, wrench, wrench_axes)
+        args = MOTION.loaded(wrench, wrench_axes, pose, twist, acceleration)
         args = (*args, self._length(length))
-        out = _shaped(self._core.joint_reactions(*args), shape)
-        marks = {name: out[name] == 1.0 for name in ("determinate", "determinate_in_joint")}
-        return JointReactions(self.joint_list, **out | marks)
+        return JointReactions(self, joints=self.joint_list, **self._core.joint_reactions(*args))
 
     def forward_dynamics(
         self,
@@ -825,9 +824,8 @@ class Mechanism:
         >>> bool(abs(mech.forward_dynamics(pose, np.zeros(6), holding).acceleration).max() < 1e-9)
         True
         """
-        states = {"pose": (pose, (4, 4)), "twist": (twist, (6,)), "forces": (forces, (self.n_legs,))}
-        shape, args = self._loaded(wrench, wrench_axes, **states)
-        return ForwardDynamics(**_shaped(self._core.forward_dynamics(*args), shape))
+        args = self._driven.loaded(wrench, wrench_axes, pose, twist, forces)
+        return ForwardDynamics(self, **self._core.forward_dynamics(*args))
 
     def equations_of_motion(
         self, pose: ArrayLike, twist: ArrayLike, coordinates: str | Sequence[str] | None = None
@@ -854,7 +852,7 @@ class Mechanism:
         >>> terms.coordinates, bool((np.linalg.eigvalsh(terms.mass) > 0).all())
         (('alpha', 'p', 'h', 'beta', 'gamma'), True)
         """
-        shape, (poses, twists) = self._batch(pose=(pose, (4, 4)), twist=(twist, (6,)))
+        poses, twists = MOVING(pose, twist)
         names = None if coordinates is None or isinstance(coordinates, str) else list(coordinates)
         set = coordinates if names is None else self._set_of(dict.fromkeys(names, 0.0))
         if set is not None and set not in self._sets:
@@ -864,8 +862,8 @@ class Mechanism:
                 "the coordinates of the set tool are not independent: only the direction of the axis counts; "
                 f"take one of {', '.join(name for name in self._sets if name != 'tool')}"
             )
-        found, table = self._core.equations_of_motion(poses, twists, set, names)
-        return EquationsOfMotion(coordinates=tuple(found), **_shaped(table, shape))
+        found, out = self._core.equations_of_motion(poses, twists, set, names)
+        return EquationsOfMotion(self, coordinates=tuple(found), **out)
 
     def power(
         self,
@@ -876,8 +874,8 @@ class Mechanism:
         wrench_axes: str = "base",
     ) -> Power:
         """Energies and every power of their balance [T17]. Arguments as for `inverse_dynamics`."""
-        shape, args = self._loaded_states(pose, twist, acceleration, wrench, wrench_axes)
-        return Power(**_shaped(self._core.power(*args), shape))
+        args = MOTION.loaded(wrench, wrench_axes, pose, twist, acceleration)
+        return Power(self, **self._core.power(*args))
 
     def simulate(
         self,
@@ -987,13 +985,14 @@ class Mechanism:
         (('alpha', 'p', 'h', 'beta', 'gamma'), (5, 5))
         """
         set, named = self._varied_coordinates(set, coordinates)
-        shape, args = self._loaded_states(pose, twist, acceleration, wrench, wrench_axes)
+        args = MOTION.loaded(wrench, wrench_axes, pose, twist, acceleration)
         args = (*args, set, named)
-        names, table = _core.inverse_dynamics_derivatives(self._core, *args)
+        names, out = _core.inverse_dynamics_derivatives(self._core, *args)
         _, bodies, _ = _core.inertial_parameters(self._core)
         geometry = _core.geometry_parameters(self._core)
-        arrays = _shaped(table, shape)
-        return InverseDynamicsDerivatives(tuple(names), tuple(bodies), tuple(geometry), **arrays)
+        return InverseDynamicsDerivatives(
+            self, coordinates=tuple(names), bodies=tuple(bodies), geometry=tuple(geometry), **out
+        )
 
     def regressor(
         self,
@@ -1014,10 +1013,10 @@ class Mechanism:
         >>> (y.forces @ y.values + y.forces_offset).round().tolist()
         [-13151.0, 9809.0, -4907.0, -1993.0, 10231.0]
         """
-        shape, args = self._loaded_states(pose, twist, acceleration, wrench, wrench_axes)
-        out = _shaped(_core.regressor(self._core, *args), shape)
+        args = MOTION.loaded(wrench, wrench_axes, pose, twist, acceleration)
+        out = _core.regressor(self._core, *args)
         names, _, values = _core.inertial_parameters(self._core)
-        return Regressor(tuple(names), values, **out)
+        return Regressor(self, names=tuple(names), values=values, **out)
 
     def base_parameters(self) -> BaseParameters:
         """The minimal set of inertial parameters, those combinations that active forces can tell apart [T58].
@@ -1044,17 +1043,18 @@ class Mechanism:
         columns, combination, remainders = found
         names, _, values = _core.inertial_parameters(self._core)
         return BaseParameters(
-            tuple(names[i] for i in columns),
-            np.array(columns, dtype=np.int64),
-            combination,
-            combination @ values,
-            tuple(names),
-            remainders,
+            self,
+            names=tuple(names[i] for i in columns),
+            columns=np.array(columns, dtype=np.int64),
+            combination=combination,
+            values=combination @ values,
+            parameters=tuple(names),
+            remainders=remainders,
         )
 
     # --- limits ------------------------------------------------------------------------------------------
 
-    @property
+    @cached_property
     def limit_list(self) -> tuple[Limit, ...]:
         """All limits that the file sets: joints, then clearances, conditioning, forces [T35]."""
         return tuple(
@@ -1091,22 +1091,12 @@ class Mechanism:
         ('stroke min of leg 2', np.float64(0.0941), True)
         """
         if twist is None and acceleration is None:
-            shape, (poses, *load) = self._loaded(wrench, wrench_axes, pose=(pose, (4, 4)))
-            args: tuple[Any, ...] = (poses, np.empty(0), np.empty(0), *load)
+            poses, *load = POSE.loaded(wrench, wrench_axes, pose)
+            args: Loaded = (poses, _AT_REST, _AT_REST, *load)
         else:
-            rest = np.zeros(6)
-            twist, acceleration = (rest if a is None else a for a in (twist, acceleration))
-            shape, args = self._loaded_states(pose, twist, acceleration, wrench, wrench_axes)
-        out = _shaped(self._core.limits(*args), shape)
-        binding = out["binding"]
-        return Limits(
-            tuple(limit.name for limit in self.limit_list),
-            out["margins"],
-            out["relative"],
-            np.where(np.isnan(binding), -1, binding).astype(np.int64),
-            out["within"] == 1.0,
-            out["status"],
-        )
+            twist, acceleration = (np.zeros(6) if a is None else a for a in (twist, acceleration))
+            args = MOTION.loaded(wrench, wrench_axes, pose, twist, acceleration)
+        return Limits(self, names=self._limit_names, **self._core.limits(*args))
 
     def coupled_forces(
         self, pose: ArrayLike, constraint: ArrayLike, *, as_printed: bool = False
@@ -1121,60 +1111,17 @@ class Mechanism:
         Raises:
             CoordinateError: the mechanism has no two legs that share a constraint on one rod.
         """
-        shape, (poses, multipliers) = self._batch(
-            pose=(pose, (4, 4)), constraint=(constraint, (6 - self.dof,))
-        )
+        poses, multipliers = Arguments(pose=(4, 4), constraint=(6 - self.dof,))(pose, constraint)
         result = self._core.coupled_forces(poses, multipliers, as_printed)
         if result is None:
             raise CoordinateError(f"{self.name} has no two legs that share a constraint on one rod")
         first, second = result[0]
-        return CoupledForces((self.leg_names[first], self.leg_names[second]), **_shaped(result[1], shape))
+        return CoupledForces(self, legs=(self.leg_names[first], self.leg_names[second]), **result[1])
 
-    # --- arrays ------------------------------------------------------------------------------------------
 
-    def _states(
-        self, pose: ArrayLike, twist: ArrayLike, acceleration: ArrayLike
-    ) -> tuple[tuple[int, ...], list[Array]]:
-        return self._batch(pose=(pose, (4, 4)), twist=(twist, (6,)), acceleration=(acceleration, (6,)))
-
-    def _loaded_states(
-        self,
-        pose: ArrayLike,
-        twist: ArrayLike,
-        acceleration: ArrayLike,
-        wrench: ArrayLike | None,
-        wrench_axes: str,
-    ) -> tuple[tuple[int, ...], tuple[Any, ...]]:
-        states = {"pose": (pose, (4, 4)), "twist": (twist, (6,)), "acceleration": (acceleration, (6,))}
-        return self._loaded(wrench, wrench_axes, **states)
-
-    def _loaded(
-        self, wrench: ArrayLike | None, wrench_axes: str, **arguments: tuple[ArrayLike, tuple[int, ...]]
-    ) -> tuple[tuple[int, ...], tuple[Any, ...]]:
-        """The arrays of `_batch`, then the load, if it is not the own one, and whether in platform axes."""
-        check_wrench_axes(wrench_axes)
-        if wrench is None:
-            shape, arrays = self._batch(**arguments)
-            return shape, (*arrays, None, False)
-        shape, arrays = self._batch(**arguments, wrench=(wrench, (6,)))
-        return shape, (*arrays, wrench_axes == "platform")
-
-    @staticmethod
-    def _batch(**arguments: tuple[ArrayLike, tuple[int, ...]]) -> tuple[tuple[int, ...], list[Array]]:
-        """The common leading shape of arrays with the given trailing shapes, and the arrays spread to it."""
-        arrays, shapes = [], []
-        for name, (value, core) in arguments.items():
-            array = _array(name, value, core)
-            arrays.append(array)
-            shapes.append(array.shape[: array.ndim - len(core)])
-        shape = shapes[0]
-        # Plain calls, those of a controller, do without numpy's slow broadcasting.
-        if shapes.count(shape) == len(shapes):
-            return shape, [a if a.flags.c_contiguous else np.ascontiguousarray(a) for a in arrays]
-        shape = _broadcast(*shapes)
-        return shape, [
-            _spread(a, shape, core) for a, (_, core) in zip(arrays, arguments.values(), strict=True)
-        ]
+def _by_name(names: Sequence[str], rows: Array) -> dict[str, Array]:
+    """The last axis by names; numbers for a single state."""
+    return {name: rows[..., i][()] for i, name in enumerate(names)}
 
 
 def _plain(value: Any) -> Any:
@@ -1197,47 +1144,6 @@ def _positive(name: str, value: float) -> float:
 
 def _from_parts(data: dict[str, Any], text: str | None) -> Mechanism:
     return Mechanism(data, text=text)
-
-
-def check_wrench_axes(name: str) -> None:
-    """Refuses axes that a load cannot be given in."""
-    if name not in ("base", "platform"):
-        raise UnknownNameError("wrench_axes", name, ("base", "platform"))
-
-
-def _number(name: str, value: ArrayLike) -> Array:
-    return _array(name, value, ())
-
-
-def _array(name: str, value: ArrayLike, core: tuple[int, ...]) -> Array:
-    """`value` as doubles whose last axes are `core`."""
-    try:
-        array = np.asarray(value, np.float64)
-    except (TypeError, ValueError) as error:
-        raise ShapeError(f"{name} is not an array of numbers: {error}") from None
-    if array.shape[array.ndim - len(core) :] != core:
-        expected = ", ".join(["...", *map(str, core)])
-        raise ShapeError(f"{name} has the shape {array.shape}; needs ({expected})")
-    return array
-
-
-def _broadcast(*shapes: tuple[int, ...]) -> tuple[int, ...]:
-    try:
-        return np.broadcast_shapes(*shapes)
-    except ValueError:
-        raise ShapeError(f"leading axes {', '.join(map(str, shapes))} do not broadcast") from None
-
-
-def _spread(array: Array, shape: tuple[int, ...], core: tuple[int, ...]) -> Array:
-    """Contiguous, one row for each state."""
-    return np.ascontiguousarray(np.broadcast_to(array, shape + core))
-
-
-def _shaped(table: Mapping[str, NDArray[Any]], shape: tuple[int, ...]) -> dict[str, NDArray[Any]]:
-    """The core's arrays with the batch's own leading axes."""
-    if table["status"].shape == shape:
-        return dict(table)
-    return {name: array.reshape(shape + array.shape[1:]) for name, array in table.items()}
 
 
 def list_mechanisms() -> tuple[str, ...]:

@@ -34,7 +34,7 @@ from importlib import resources
 from importlib.resources.abc import Traversable
 from os import PathLike
 from pathlib import Path
-from typing import Annotated, Any, Literal, Protocol
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Protocol
 
 import numpy as np
 from annotated_types import Ge
@@ -46,6 +46,10 @@ from polypod.columns import Column, columns_to_si, read_header, read_numbers, re
 from polypod.errors import Fault, MotionError, ShapeError, UnknownNameError, alternatives, shown
 from polypod.schema import Number, Table, Vector, read_table
 from polypod.units import KIND_OF_COORDINATE, MOTION_KINDS, read_units
+from polypod.variables import COMPONENTS, TIME, variable
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 Array = NDArray[np.float64]
 Axes = Literal["base", "platform"]
@@ -77,7 +81,7 @@ class Curve(Protocol):
         """The derivative of order `nu` at times (N,), shape (N, number of coordinates)."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Motion:
     """Coordinates of the set `set` at N instants, SI, with their exact rates and second rates."""
 
@@ -105,6 +109,36 @@ class Motion:
         if self.wrench_axes not in ("base", "platform"):
             needed = f'is {shown(self.wrench_axes)}; needs "base" or "platform"'
             raise MotionError([Fault("wrench_axes", needed)], self.name)
+
+    def __repr__(self) -> str:
+        return (
+            f"<Motion {self.name}: {', '.join(self.coordinates)}; {len(self.time)} states "
+            f"from {self.time[0]:g} s to {self.time[-1]:g} s>"
+        )
+
+    def _repr_html_(self) -> str:
+        from polypod.cards import of_motion
+
+        return of_motion(self)
+
+    def to_xarray(self) -> xr.Dataset:
+        """Coordinates, rates, second rates and load over `time`, named as in the dataset of a solution."""
+        import xarray as xr
+
+        prefixes = ("coordinate_", "coordinate_rate_", "coordinate_second_rate_")
+        series = zip(prefixes, (self.coordinates, self.rates, self.second_rates), strict=True)
+        columns = {prefix + name: column for prefix, of in series for name, column in of.items()}
+        if self.wrench is not None:
+            columns["wrench"] = self.wrench
+        data = {
+            name: (("time", *variable(name).dims), column, variable(name).attributes)
+            for name, column in columns.items()
+        }
+        coords: dict[str, Any] = {"time": ("time", self.time, TIME)}
+        if self.wrench is not None:
+            coords["component"] = list(COMPONENTS)
+        attrs = {"title": self.name, "coordinate_set": self.set, "branch": self.branch}
+        return xr.Dataset(data, coords, {**attrs, "wrench_axes": self.wrench_axes})
 
     @classmethod
     def through(

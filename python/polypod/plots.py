@@ -7,10 +7,8 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -25,10 +23,15 @@ from polypod.errors import PolypodError, ShapeError
 from polypod.mechanism import Mechanism
 from polypod.results import Solution
 from polypod.scene import Scene, draw, frame, joint_handles, math_name
+from polypod.series import Panel as Panel
+from polypod.series import draw_panel, pyplot_figure, stroke_of
+from polypod.series import in_kilo as in_kilo
+from polypod.series import plot_series as plot_series
 from polypod.status import Status, count
-from polypod.style import BLUE, GREY, INK, PALE, color_of, dash_of, house_style
+from polypod.style import BLUE, GREY, INK, house_style
 from polypod.summary import link_kind, links_by_joints
 from polypod.workspace_plot import plot_workspace as plot_workspace
+from polypod.workspace_plot import plot_workspace_view as plot_workspace_view
 
 Array = NDArray[np.float64]
 
@@ -68,7 +71,7 @@ def plot_mechanism(
     place = _checked_pose(mech.home if pose is None else pose)
     with house_style():
         if ax is None:
-            ax = _pyplot_figure((5.2, 5.6)).add_subplot(projection="3d")
+            ax = pyplot_figure((5.2, 5.6)).add_subplot(projection="3d")
         if not isinstance(ax, Axes3D):
             raise PolypodError('the mechanism is drawn in space: make the axes with projection="3d"')
         scene = Scene(mech, place)
@@ -105,7 +108,7 @@ def plot_poses(
     columns = min(columns, len(places))
     rows = -(-len(places) // columns)
     with house_style():
-        figure = figure or _pyplot_figure((3.2 * columns, 3.5 * rows))
+        figure = figure or pyplot_figure((3.2 * columns, 3.5 * rows))
         scenes = [Scene(mech, _checked_pose(pose)) for pose in places]
         half = np.max([np.ptp(scene.corners(), axis=0) / 2 for scene in scenes], axis=0)
         cells = figure.add_gridspec(
@@ -132,27 +135,7 @@ def _checked_pose(pose: ArrayLike) -> Array:
     return array
 
 
-def _pyplot_figure(size: tuple[float, float], **more: Any) -> Figure:
-    # Here, so that those who bring their own figure need no screen and no pyplot.
-    from matplotlib import pyplot
-
-    return pyplot.figure(figsize=size, **more)
-
-
 # --- the curves of Fig. 4 -----------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True)
-class _Panel:
-    """Curves over time in one unit, as they are drawn."""
-
-    label: str
-    unit: str
-    values: Array
-    """(time, curve)."""
-    curves: tuple[str, ...]
-    limits: tuple[float, ...] = ()
-    """Levels to mark."""
 
 
 _COMPONENTS = "xyz"
@@ -170,11 +153,11 @@ def plot_fig4(solution: Solution, figure: Figure | None = None) -> Figure:
     as zero.
     """
     data = solution.dataset
-    panels = [panel for panel in _panels(data) if panel is not None]
+    panels = fig4_panels(data)
     columns = 3
     rows = -(-len(panels) // columns)
     with house_style():
-        figure = figure or _pyplot_figure((10.0, 2.55 * rows + 0.3))
+        figure = figure or pyplot_figure((10.0, 2.55 * rows + 0.3))
         figure.set_layout_engine("none")
         width, height = figure.get_size_inches()
         grid = figure.subplots(rows, columns, sharex=True, squeeze=False)
@@ -186,7 +169,7 @@ def plot_fig4(solution: Solution, figure: Figure | None = None) -> Figure:
         time = data["time"].to_numpy()
         lost = (data["status"] != Status.OK).to_numpy()
         for i, (ax, panel) in enumerate(zip(grid.flat, panels, strict=False)):
-            _draw_panel(ax, panel, time, lost)
+            draw_panel(ax, panel, time, lost)
             ax.text(-0.02, 1.04, f"({chr(97 + i)})", transform=ax.transAxes, ha="right", va="bottom")
         if lost.any():
             reasons = (
@@ -202,51 +185,23 @@ def plot_fig4(solution: Solution, figure: Figure | None = None) -> Figure:
     return figure
 
 
-def _draw_panel(ax: Axes, panel: _Panel, time: Array, lost: NDArray[np.bool_]) -> None:
-    for i, curve in enumerate(panel.curves):
-        ax.plot(time, panel.values[:, i], color=color_of(i), linestyle=dash_of(i), label=curve)
-    for level in panel.limits:
-        ax.axhline(level, color=GREY, linewidth=0.7, linestyle=(0, (4, 3)))
-    for first, last in _spans(lost):
-        ax.axvspan(time[max(first - 1, 0)], time[min(last + 1, len(time) - 1)], color=PALE, zorder=0)
-    ax.set_ylabel(f"{panel.label} / {panel.unit}" if panel.unit else panel.label)
-    ax.margins(y=0.08)
-    finite = panel.values[np.isfinite(panel.values)]
-    if finite.size == 0 or np.ptp(finite) == 0.0:
-        ax.margins(y=0.5)
-    ax.ticklabel_format(axis="y", style="sci", scilimits=(-3, 5))
-    many = len(panel.curves) > 5
-    ax.legend(
-        loc="lower left",
-        bbox_to_anchor=(0.0, 1.0),
-        ncols=-(-len(panel.curves) // 2) if len(panel.curves) > 7 else max(len(panel.curves), 1),
-        handlelength=0.9 if many else None,
-        columnspacing=0.6 if many else None,
-    )
-
-
-def _spans(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """First and last index of each run of true ones."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(np.int8)))
-    return [(int(a), int(b) - 1) for a, b in edges.reshape(-1, 2)]
-
-
-def _panels(data: xr.Dataset) -> list[_Panel | None]:
+def fig4_panels(data: xr.Dataset) -> list[Panel]:
+    """The panels of the paper's Fig. 4 in its order: platform, legs, forces; see `plot_fig4`."""
     legs = [math_name(str(name)) for name in data["leg"].to_numpy()]
 
-    def six(name: str, part: int, label: str, symbol: str, unit: str, scale: float = 1.0) -> _Panel:
+    def six(name: str, part: int, label: str, symbol: str, unit: str, scale: float = 1.0) -> Panel:
         values = scale * data[name].to_numpy()[:, 3 * part : 3 * part + 3]
-        return _Panel(label, unit, values, tuple(f"${symbol}_{c}$" for c in _COMPONENTS))
+        return Panel(label, unit, values, tuple(f"${symbol}_{c}$" for c in _COMPONENTS))
 
-    def of_legs(name: str, label: str, symbol: str, unit: str, scale: float = 1.0) -> _Panel:
+    def of_legs(name: str, label: str, symbol: str, unit: str, scale: float = 1.0) -> Panel:
         curves = tuple(f"${symbol.replace('#', leg)}$" for leg in legs)
         values = scale * data[name].to_numpy()
-        return _Panel(label, unit, values, curves, _stroke(data) if name == "length" else ())
+        return Panel(label, unit, values, curves, stroke_of(data) if name == "length" else ())
 
     position = 1e3 * data["pose"].to_numpy()[:, :3, 3]
     forces = of_legs("force", "active force $f_a$", "f_{a#}", "N")
-    return [
-        _Panel("position of $o$", "mm", position, ("$X_o$", "$Y_o$", "$Z_o$")),
+    panels = [
+        Panel("position of $o$", "mm", position, ("$X_o$", "$Y_o$", "$Z_o$")),
         six("twist", 0, "velocity $v$", "v", "mm s$^{-1}$", 1e3),
         six("acceleration", 0, "acceleration $a$", "a", "mm s$^{-2}$", 1e3),
         six("twist", 1, r"angular velocity $\omega$", r"\omega", "rad s$^{-1}$"),
@@ -255,22 +210,14 @@ def _panels(data: xr.Dataset) -> list[_Panel | None]:
         of_legs("length", "leg length $r$", "r_{#}", "mm", 1e3),
         of_legs("rate", "leg rate $v_r$", "v_{r#}", "mm s$^{-1}$", 1e3),
         of_legs("leg_acceleration", "leg acceleration $a_r$", "a_{r#}", "mm s$^{-2}$", 1e3),
-        _in_kilo(forces),
+        in_kilo(forces),
         _second_forces(data),
         _torque(data),
     ]
+    return [panel for panel in panels if panel is not None]
 
 
-def _stroke(data: xr.Dataset) -> tuple[float, ...]:
-    """Stroke limits in mm, where all legs have the same and the solution tells its mechanism."""
-    text = data.attrs.get("mechanism_file")
-    if not text:
-        return ()
-    limits = np.unique(Mechanism.from_toml(text).stroke, axis=0)
-    return tuple(1e3 * limits[0]) if len(limits) == 1 and np.isfinite(limits).all() else ()
-
-
-def _orientation(data: xr.Dataset) -> _Panel | None:
+def _orientation(data: xr.Dataset) -> Panel | None:
     """The angles among the motion's coordinates, or without any the direction that it has in their place."""
     names = [str(n) for n in data if str(n).startswith("coordinate_") and "rate_" not in str(n)]
     angles = [n for n in names if data[n].attrs["units"] == "rad"]
@@ -282,8 +229,8 @@ def _orientation(data: xr.Dataset) -> _Panel | None:
     shorts = [n.removeprefix("coordinate_") for n in chosen]
     curves = tuple(_GREEK.get(s) or _subscripted(s) for s in shorts)
     if pure:
-        return _Panel("tool axis", "", values, curves)
-    return _Panel("angle", "deg", np.degrees(values), curves)
+        return Panel("tool axis", "", values, curves)
+    return Panel("angle", "deg", np.degrees(values), curves)
 
 
 def _subscripted(name: str) -> str:
@@ -292,36 +239,28 @@ def _subscripted(name: str) -> str:
     return f"${stem}$" if name[-1] not in "xyz" else f"${math_name(stem)}_{index}$"
 
 
-def _second_forces(data: xr.Dataset) -> _Panel:
+def _second_forces(data: xr.Dataset) -> Panel:
     """Couple-constrained forces, else constraint multipliers, else what the actuators give."""
     if "coupled_force" in data:
         curves = tuple(f"$f_{{c{math_name(str(leg))}}}$" for leg in data["coupled_leg"].to_numpy())
-        return _in_kilo(_Panel("coupled force $f_c$", "N", data["coupled_force"].to_numpy(), curves))
+        return in_kilo(Panel("coupled force $f_c$", "N", data["coupled_force"].to_numpy(), curves))
     if "constraint" in data:
         values = data["constraint"].to_numpy()
         curves = tuple(f"$f_{{c,{i + 1}}}$" for i in range(values.shape[1]))
         # Kind A-E stands first; D keeps the angle between two directions, E compares two legs' moments.
         kinds = [str(row)[0] for row in data["constraint_row"].to_numpy()]
         units = {{"D": "N m", "E": "N m$^{-1}$"}.get(kind, "N") for kind in kinds}
-        return _Panel("constraint $f_c$", " or ".join(sorted(units)), values, curves)
-    return _in_kilo(_Panel("actuator power", "W", data["actuator_power"].to_numpy()[:, None], ("$P$",)))
+        return Panel("constraint $f_c$", " or ".join(sorted(units)), values, curves)
+    return in_kilo(Panel("actuator power", "W", data["actuator_power"].to_numpy()[:, None], ("$P$",)))
 
 
-def _torque(data: xr.Dataset) -> _Panel:
+def _torque(data: xr.Dataset) -> Panel:
     """The couple-constrained torque, else the distance from a singularity."""
     if "coupled_torque" in data:
         values = data["coupled_torque"].to_numpy()[:, None]
-        return _in_kilo(_Panel("coupled torque $T_c$", "N m", values, ("$T_c$",)))
+        return in_kilo(Panel("coupled torque $T_c$", "N m", values, ("$T_c$",)))
     values = data["sigma_min"].to_numpy()[:, None]
-    return _Panel("smallest singular value", "", values, (r"$\sigma_\mathrm{min}$",))
-
-
-def _in_kilo(panel: _Panel) -> _Panel:
-    """Numbers of five digits and more in thousands."""
-    finite = panel.values[np.isfinite(panel.values)]
-    if not np.max(np.abs(finite), initial=0.0) >= 1e4:
-        return panel
-    return _Panel(panel.label, f"k{panel.unit}", panel.values / 1e3, panel.curves)
+    return Panel("smallest singular value", "", values, (r"$\sigma_\mathrm{min}$",))
 
 
 # --- the topology graph of Fig. 1b --------------------------------------------------------------------------
@@ -338,7 +277,7 @@ def plot_topology(mobility: Mobility, ax: Axes | None = None) -> Axes:
     width = len(order)
     with house_style():
         if ax is None:
-            ax = _pyplot_figure((1.15 * width + 1.2, 4.4), layout="constrained").add_subplot()
+            ax = pyplot_figure((1.15 * width + 1.2, 4.4), layout="constrained").add_subplot()
         for joint in mobility.graph_joints:
             x, (low, high) = _joint_column(joint.links, place), sorted(place[i][1] for i in joint.links)
             ax.plot([x, x], [low, high], color=GREY, linewidth=1.0, zorder=1)

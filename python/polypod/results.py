@@ -22,7 +22,7 @@ from polypod.errors import SolutionError
 _FORMAT = "polypod solution 1"
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Solution:
     """Results over time, SI, in `dataset`: variables with `units` and `long_name`, dimension `time` first.
 
@@ -35,6 +35,20 @@ class Solution:
         return isinstance(other, Solution) and self.dataset.identical(other.dataset)
 
     __hash__ = None  # type: ignore[assignment]
+
+    def __repr__(self) -> str:
+        from polypod.cards import solution_heading
+
+        return "<{}; {}>".format(*solution_heading(self))
+
+    def _repr_html_(self) -> str:
+        from polypod.cards import of_solution
+
+        return of_solution(self)
+
+    def to_xarray(self) -> xr.Dataset:
+        """The dataset, for those who ask every result alike."""
+        return self.dataset
 
     @property
     def singularities(self) -> dict[str, Any]:

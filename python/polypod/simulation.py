@@ -17,8 +17,9 @@ from scipy.optimize import brentq
 
 from polypod import _core
 from polypod.answers import ForwardDynamics, State
+from polypod.arrays import check_wrench_axes
 from polypod.errors import PolypodError, ShapeError, UnknownNameError
-from polypod.mechanism import Mechanism, check_wrench_axes
+from polypod.mechanism import Mechanism
 from polypod.passages import sampled_passages
 from polypod.results import Solution
 from polypod.singularity import Determinant
@@ -346,12 +347,26 @@ def _solution(mech: Mechanism, drive: _Drive, instants: list[_Instant], end: End
     dynamics = drive.dynamics(instants)
     set = "natural" if "natural" in mech.coordinate_sets else "pose"
     coordinates = mech.coordinates(pose, set)
-    state = State(pose, twist, dynamics.acceleration, coordinates, {}, {}, dynamics.status)
+    state = State(
+        mech,
+        pose=pose,
+        twist=twist,
+        acceleration=dynamics.acceleration,
+        coordinates=coordinates,
+        coordinate_rates={},
+        coordinate_second_rates={},
+        status=dynamics.status,
+    )
     wrench = drive.wrenches_at(instants)
     values = variables_of(mech, state, wrench, drive.wrench_axes)
     values |= {"force": drive.forces_at(instants), "constraint": dynamics.constraint}
     values["actuator_work"] = work_of(time, values["actuator_power"])
-    determinant = Determinant(values["determinant"], values["determinant_rate"], values["status"])
+    determinant = Determinant(
+        mech,
+        determinant=values["determinant"],
+        rate=values["determinant_rate"],
+        status=values["status"],
+    )
     attrs: dict[str, str | int] = {
         "title": f"{mech.name} under forces",
         "motion": "simulation",

@@ -1,14 +1,16 @@
-"""Kinds of singularities, and what is found of them at poses."""
+"""What is found of singularities at poses."""
 
 from __future__ import annotations
 
-from enum import IntEnum
-from typing import NamedTuple
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from polypod import _core
+from polypod.kinds import SingularityKind as SingularityKind
+from polypod.labelled import Answer
 
 Array = NDArray[np.float64]
 Codes = NDArray[np.uint8]
@@ -21,35 +23,8 @@ NEAR_SINGULAR = 0.01
 """Smallest singular value (a pure number) below which a pose is called nearly singular."""
 
 
-class SingularityKind(IntEnum):
-    """What is singular about a pose: the first of these conditions that holds [T32]."""
-
-    UNKNOWN = -1
-    """There is no answer: `status` says why."""
-    NONE = 0
-    LEG_LENGTH = 1
-    """A leg has no length: an inverse singularity, the paper's fourth."""
-    CONSTRAINT_VANISHES = 2
-    """The wrench of a constraint vanishes, as where L ∥ l and r ∥ L: the paper's first."""
-    CONSTRAINT = 3
-    """The constraint wrenches depend on one another: a freedom more, that no actuator controls."""
-    LEG_FRAME = 4
-    """A leg lies along the axis of its universal joint or rod: its turning about itself is undetermined."""
-    ACTUATION = 5
-    """With all actuators locked the platform can still move: a direct singularity."""
-    DEPENDENT_ROWS = 6
-    """Only the constraints that J holds depend on one another: J is singular, the mechanism is not."""
-
-    @property
-    def message(self) -> str:
-        """What it means."""
-        return _MESSAGES.get(self, "no answer; the status says why")
-
-
-_MESSAGES = {code: message for code, _, message in _core.singularity_kinds()}
-
-
-class Singularity(NamedTuple):
+@dataclass(eq=False, repr=False)
+class Singularity(Answer):
     """How near poses are to singularities, and to which kind [T24, T30-T33]; base axes.
 
     Where a leg has no direction (LEG_LENGTH) the status is SINGULAR, and only the kind, its leg, and the
@@ -90,8 +65,27 @@ class Singularity(NamedTuple):
     """(..., 3): the axis's point nearest to o, m; o for a pure translation."""
     status: Codes
 
+    _variables: ClassVar = {
+        "determinant": "determinant",
+        "sigma_min": "sigma_min",
+        "sigma_max": "sigma_max",
+        "condition": "condition",
+        "constraint_sigma": "constraint_sigma",
+        "leg_length": "relative_length",
+        "leg_sine": "leg_sine",
+        "kind": "singularity_kind",
+        "leg": "singular_leg",
+        "uncontrolled": "uncontrolled",
+        "twist": "uncontrolled_twist",
+        "axis": "screw_axis",
+        "pitch": "screw_pitch",
+        "point": "screw_point",
+        "status": "status",
+    }
 
-class Determinant(NamedTuple):
+
+@dataclass(eq=False, repr=False)
+class Determinant(Answer):
     """det J in pure numbers along a motion [T30]."""
 
     determinant: Array
@@ -100,8 +94,15 @@ class Determinant(NamedTuple):
     """(...): exact rate along the twist, 1/s."""
     status: Codes
 
+    _variables: ClassVar = {
+        "determinant": "determinant",
+        "rate": "determinant_rate",
+        "status": "status",
+    }
 
-class SingularityDistance(NamedTuple):
+
+@dataclass(eq=False, repr=False)
+class SingularityDistance(Answer):
     """How far each coordinate goes, the others kept, until det J is zero [T34]; m and rad."""
 
     coordinates: tuple[str, ...]
@@ -120,6 +121,19 @@ class SingularityDistance(NamedTuple):
     searched: Array
     """(..., k, 2): value up to which poses were looked at: the reach, or where poses end."""
     status: Codes
+
+    _variables: ClassVar = {
+        "value": "coordinate_value",
+        "singular": "singular_value",
+        "distance": "singular_distance",
+        "kind": "singular_kind",
+        "searched": "searched_value",
+        "status": "status",
+    }
+
+    def labels(self) -> dict[str, Sequence[str]]:
+        """The coordinates."""
+        return {"coordinate": self.coordinates}
 
 
 def codes(values: Array) -> Kinds:

@@ -66,8 +66,14 @@ _RC: Any = {  # no type: matplotlib's own names every setting there is
 @contextmanager
 def house_style() -> Iterator[None]:
     """The look applies to what is made, drawn or saved inside; matplotlib's own settings come back after."""
-    with mpl.rc_context(_RC):
+    # Not by rc_context, which takes back other settings, too: pyplot, where it is first used inside, turns
+    # the interactive mode of notebooks on.
+    before = {name: mpl.rcParams[name] for name in _RC}
+    mpl.rcParams.update(_RC)
+    try:
         yield
+    finally:
+        mpl.rcParams.update(before)
 
 
 def color_of(index: int) -> str:

@@ -43,7 +43,7 @@ _FORMAT = "polypod workspace 1"
 WHITE = "#FFFFFF"
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Workspace:
     """The set of all coordinates that a mechanism can take within its limits [T40, T42, T43].
 
@@ -158,6 +158,16 @@ class Workspace:
         return isinstance(other, Workspace) and self.to_xarray().identical(other.to_xarray())
 
     __hash__ = None  # type: ignore[assignment]
+
+    def __repr__(self) -> str:
+        from polypod.cards import workspace_heading
+
+        return "<{}; {}>".format(*workspace_heading(self))
+
+    def _repr_html_(self) -> str:
+        from polypod.cards import of_workspace
+
+        return of_workspace(self)
 
     def save(self, path: str | PathLike[str]) -> None:
         """Writes the boundary (`.stl`, `.ply`, `.glb`) or everything (`.nc`); meshes are in m and rad.

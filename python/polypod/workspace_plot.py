@@ -15,6 +15,7 @@ from matplotlib.patches import PathPatch
 from matplotlib.path import Path as Outline
 from numpy.typing import NDArray
 
+from polypod.errors import UnknownNameError, WorkspaceError
 from polypod.style import INK, PALE, house_style
 from polypod.workspace import Workspace
 
@@ -41,6 +42,9 @@ _DARKEST = 0.55
 
 _SWATCH: Any = {"linestyle": "none", "marker": "s", "markersize": 6.5}
 
+VIEWS = {"top": (0, 1), "side": (1, 2), "front": (0, 2)}
+"""Axes across and up in views along the third."""
+
 _ELEVATION, _AZIMUTH = math.radians(24.0), math.radians(-60.0)
 
 
@@ -58,8 +62,44 @@ def plot_workspace(workspace: Workspace, figure: Figure | None = None) -> Figure
         if len(workspace.names) == 3:
             _draw_views(workspace, figure)
         else:
-            _draw_outline(workspace, figure)
+            low = (0.75 + 0.17 * _legend(workspace, figure)) / figure.get_size_inches()[1]
+            _draw_outline(figure.add_axes((0.13, low, 0.84, 0.97 - low)), workspace)
     return figure
+
+
+def plot_workspace_view(
+    workspace: Workspace, ax: Axes | None = None, *, view: str | None = None, legend: bool = True
+) -> Axes:
+    """One view of a workspace, or the outline of one of two coordinates; colours as in `plot_workspace`.
+
+    Args:
+        workspace: what to draw.
+        ax: plain axes to draw on.
+        view: top, side, front or isometric, for three coordinates; isometric by default.
+        legend: what ends the workspace, to the right of it.
+
+    Raises:
+        UnknownNameError: no such view.
+        WorkspaceError: a view of an outline.
+    """
+    space = len(workspace.names) == 3
+    if view is not None and not space:
+        raise WorkspaceError(f"view is {view!r}; a workspace of two coordinates has an outline and no views")
+    view = view or "isometric"
+    if view not in (*VIEWS, "isometric"):
+        raise UnknownNameError("view", view, (*VIEWS, "isometric"))
+    with house_style():
+        if ax is None:
+            from matplotlib import pyplot
+
+            ax = pyplot.figure(figsize=(5.6, 4.0), layout="constrained").add_subplot()
+        if space:
+            _draw_view(ax, workspace, view)
+        else:
+            _draw_outline(ax, workspace)
+        if legend:
+            ax.legend(handles=_handles(workspace), loc="upper left", bbox_to_anchor=(1.02, 1.0))
+    return ax
 
 
 def _scaled(workspace: Workspace) -> tuple[Array, list[str]]:
@@ -73,17 +113,9 @@ def _scaled(workspace: Workspace) -> tuple[Array, list[str]]:
 
 
 def _draw_views(workspace: Workspace, figure: Figure) -> None:
-    points, texts = _scaled(workspace)
-    one_unit = len({*workspace.units}) == 1
-    x, y, z = np.eye(3)
-    # Each view has the one that shares its axis beside or below it.
-    views = (
-        ("(a)  top view", x, y, (0, 1), (0, 0)),
-        ("(b)  side view", y, z, (1, 2), (1, 1)),
-        ("(c)  front view", x, z, (0, 2), (1, 0)),
-    )
+    points, _ = _scaled(workspace)
     low = (0.75 + 0.17 * _legend(workspace, figure)) / figure.get_size_inches()[1]
-    spans = np.ptp(points, axis=0) if one_unit else np.ones(3)
+    spans = np.ptp(points, axis=0) if _in_one_unit(workspace) else np.ones(3)
     cells = figure.add_gridspec(
         nrows=2,
         ncols=2,
@@ -96,25 +128,38 @@ def _draw_views(workspace: Workspace, figure: Figure) -> None:
         wspace=0.22,
         hspace=0.27,
     )
-    for title, right, up, (across, along), cell in views:
+    # Each view has the one that shares its axis beside or below it.
+    places = {"top": (0, 0), "side": (1, 1), "front": (1, 0), "isometric": (0, 1)}
+    for letter, (view, cell) in zip("abcd", places.items(), strict=True):
         ax = figure.add_subplot(cells[cell])
-        _draw_faces(ax, workspace, points, right, up)
+        _draw_view(ax, workspace, view)
+        ax.set_title(f"({letter})  {view} view")
+
+
+def _in_one_unit(workspace: Workspace) -> bool:
+    return len({*workspace.units}) == 1
+
+
+def _draw_view(ax: Axes, workspace: Workspace, view: str) -> None:
+    """One view of a boundary in space, along an axis with scales or isometric with a triad."""
+    points, texts = _scaled(workspace)
+    if view == "isometric":
+        even = points if _in_one_unit(workspace) else points / np.ptp(points, axis=0)
+        right, up = _isometric()
+        _draw_faces(ax, workspace, even, right, up)
+        _draw_triad(ax, even, right, up, [_SYMBOLS.get(name, name) for name in workspace.names])
+        ax.set_aspect("equal", adjustable="datalim")
+        ax.margins(0.06)
+        ax.set_axis_off()
+    else:
+        across, along = VIEWS[view]
+        axes = np.eye(3)
+        _draw_faces(ax, workspace, points, axes[across], axes[along])
         ax.set(xlabel=texts[across], ylabel=texts[along])
-        ax.set_title(title)
         ax.margins(0.04)
-        ax.autoscale_view()
-        if one_unit:
+        if _in_one_unit(workspace):
             ax.set_aspect("equal", adjustable="box")
-    ax = figure.add_subplot(cells[0, 1])
-    even = points if one_unit else points / np.ptp(points, axis=0)
-    right, up = _isometric()
-    _draw_faces(ax, workspace, even, right, up)
-    _draw_triad(ax, even, right, up, [_SYMBOLS.get(name, name) for name in workspace.names])
-    ax.set_title("(d)  isometric view")
-    ax.set_aspect("equal", adjustable="datalim")
-    ax.margins(0.06)
     ax.autoscale_view()
-    ax.set_axis_off()
 
 
 def _isometric() -> tuple[Array, Array]:
@@ -136,7 +181,7 @@ def _draw_faces(ax: Axes, workspace: Workspace, points: Array, right: Array, up:
     light = np.clip(smooth @ (_LIGHT / np.linalg.norm(_LIGHT)), 0.0, 1.0)
     palette = np.array([to_rgb(color) for color in workspace.colors])
     brightness = _DARKEST + (1.0 - _DARKEST) * light[:, None]
-    colors = (palette[_face_labels(workspace)[seen]] * brightness)[order]
+    colors = (palette[face_labels(workspace)[seen]] * brightness)[order]
     flat = (corners @ np.stack([right, up], axis=1))[order]
     # Edges of the same colour close the seams; as a picture inside the SVG the many faces stay small.
     ax.add_collection(
@@ -155,7 +200,7 @@ def _smoothed(workspace: Workspace, normals: Array) -> Array:
     return np.asarray(mixed / np.maximum(np.linalg.norm(mixed, axis=1, keepdims=True), 1e-300))
 
 
-def _face_labels(workspace: Workspace) -> NDArray[np.int64]:
+def face_labels(workspace: Workspace) -> NDArray[np.int64]:
     """(f,): the label that most corners have, else that of the first."""
     first, second, third = workspace.labels[workspace.faces].T
     return np.asarray(np.where(second == third, second, first))
@@ -176,10 +221,8 @@ def _draw_triad(ax: Axes, points: Array, right: Array, up: Array, names: list[st
     ax.update_datalim([corner - 0.5 * size, corner + 1.3 * size])
 
 
-def _draw_outline(workspace: Workspace, figure: Figure) -> None:
+def _draw_outline(ax: Axes, workspace: Workspace) -> None:
     points, texts = _scaled(workspace)
-    low = (0.75 + 0.17 * _legend(workspace, figure)) / figure.get_size_inches()[1]
-    ax = figure.add_axes((0.13, low, 0.84, 0.97 - low))
     # Rings follow one another; a segment that does not lead to the next point closes its ring.
     closing = workspace.faces[:, 1] != workspace.faces[:, 0] + 1
     codes = np.full(len(points), Outline.LINETO, dtype=np.uint8)
@@ -194,19 +237,24 @@ def _draw_outline(workspace: Workspace, figure: Figure) -> None:
     ax.set(xlabel=texts[0], ylabel=texts[1])
     ax.margins(0.04)
     ax.autoscale_view()
-    if len({*workspace.units}) == 1 and 0.2 < np.divide(*np.ptp(points, axis=0)) < 5.0:
+    if _in_one_unit(workspace) and 0.2 < np.divide(*np.ptp(points, axis=0)) < 5.0:
         ax.set_aspect("equal", adjustable="box")
 
 
 def _legend(workspace: Workspace, figure: Figure) -> int:
-    """What ends the workspace, below the picture in rows, limits of a kind together; the number of rows."""
-    kinds = [limit.kind for limit in workspace.mechanism.limit_list]
-    present = np.unique(workspace.labels).tolist()
-    present.sort(key=lambda i: (kinds.index(kinds[i]) if i < len(kinds) else len(kinds), i))
-    handles = [
-        Line2D([], [], color=workspace.colors[i], label=workspace.label_names[i], **_SWATCH) for i in present
-    ]
+    """What ends the workspace, below the picture in rows; the number of rows."""
+    handles = _handles(workspace)
     columns = min(len(handles), max(int(figure.get_size_inches()[0] / 1.55), 1))
     by_column = [handle for column in range(columns) for handle in handles[column::columns]]
     figure.legend(handles=by_column, loc="lower center", ncols=columns, bbox_to_anchor=(0.5, 0.008))
     return -(-len(handles) // columns)
+
+
+def _handles(workspace: Workspace) -> list[Line2D]:
+    """A swatch for everything that ends the workspace, limits of a kind together."""
+    kinds = [limit.kind for limit in workspace.mechanism.limit_list]
+    present = np.unique(workspace.labels).tolist()
+    present.sort(key=lambda i: (kinds.index(kinds[i]) if i < len(kinds) else len(kinds), i))
+    return [
+        Line2D([], [], color=workspace.colors[i], label=workspace.label_names[i], **_SWATCH) for i in present
+    ]

@@ -41,9 +41,9 @@ pub struct BaseParameters {
 /// The base parameters from the regressors of random states; none if too few states could be drawn.
 #[must_use]
 pub fn base_parameters(mech: &Mechanism) -> Option<BaseParameters> {
-    let mut regressor = Regressor::new(mech);
+    let regressor = Regressor::new(mech);
     let units: Vec<f64> = regressor.parameters.iter().map(|p| unit(p, mech.characteristic_length)).collect();
-    let stacked = stacked(mech, &mut regressor, &units)?;
+    let stacked = stacked(mech, &regressor, &units)?;
     let (columns, remainders) = independent_columns(&stacked);
     let (q, r) = stacked.select_columns(&columns).qr().unpack();
     let solved = r.solve_upper_triangular(&(q.transpose() * &stacked))?;
@@ -66,7 +66,7 @@ fn unit(p: &Parameter, scale: f64) -> f64 {
 }
 
 /// Regressors of active forces at random states, each state's rows divided by their largest entry.
-fn stacked(mech: &Mechanism, regressor: &mut Regressor, units: &[f64]) -> Option<DMatrix<f64>> {
+fn stacked(mech: &Mechanism, regressor: &Regressor, units: &[f64]) -> Option<DMatrix<f64>> {
     let (dof, width) = (mech.dof(), units.len());
     let states = (SURPLUS * width).div_ceil(dof);
     let mut draw = Draw(0x9E37_79B9_7F4A_7C15);
@@ -77,7 +77,7 @@ fn stacked(mech: &Mechanism, regressor: &mut Regressor, units: &[f64]) -> Option
             return Some(rows);
         }
         let Some(state) = random_state(mech, &mut draw) else { continue };
-        let columns = regressor.columns(&state);
+        let columns = regressor.columns(mech, &state);
         let entries = DMatrix::from_fn(dof, width, |i, j| columns[j][i] * units[j]);
         let size = entries.amax();
         if size.is_finite() && size > 0.0 {

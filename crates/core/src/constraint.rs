@@ -4,7 +4,7 @@
 use crate::leg;
 use crate::mechanism::{Constraint, ConstraintKind, Joint, Leg, Mechanism, Partner};
 use crate::quadratic::{Hessian, add_centripetal, add_mixed, point_columns};
-use crate::real::{Constant, Real, Scalar, Trig};
+use crate::real::{Constant, Ordered, Real, Scalar, Trig};
 use crate::spatial::{Mat3, Pose, Vec3, Wrench};
 use crate::spec::{ANGLE_TOLERANCE, JointKind};
 
@@ -260,9 +260,11 @@ pub fn row_unit(row: &Wrench<f64>, scale: f64) -> f64 {
 }
 
 /// How far the platform must move to satisfy the constraint, to first order, turns counted as arcs at `scale`, m.
+#[inline(always)]
 #[must_use]
-pub fn distance(c: &Constraint, pose: &Pose<f64>, scale: f64) -> f64 {
-    value(c, pose).abs() / row_unit(&row(c, pose), scale)
+pub fn distance<V: Ordered>(c: &Constraint, pose: &Pose<V>, scale: f64) -> V {
+    let size = square(&row(c, pose), scale).sqrt();
+    value(c, pose).abs() / V::lit(VANISHING_ROW).most(size)
 }
 
 /// The largest distance by which a pose misses an independent constraint, m.

@@ -5,7 +5,7 @@
 //! place with trigonometry.
 
 use crate::constraint;
-use crate::lanes::{Lanes, WIDTH};
+use crate::lanes::{Lanes, any};
 use crate::linear::solve;
 use crate::mechanism::{Constraint, ConstraintKind, MAX_CONSTRAINTS, Mechanism};
 use crate::mobility::count;
@@ -127,6 +127,20 @@ impl<S: Scalar> Set<S> {
     }
 }
 
+impl Set<Dual<f64>> {
+    /// Whether its map varies.
+    pub(crate) fn varies(&self) -> bool {
+        match self {
+            Set::Paper(plane) | Set::Natural(plane) => {
+                let axes = plane.base.0.into_iter().chain(plane.platform.0);
+                let all = axes.chain([plane.base_point, plane.platform_point]);
+                all.flat_map(Vec3::array).any(|x| x.d != 0.0)
+            }
+            Set::Tool | Set::Pose => false,
+        }
+    }
+}
+
 impl Set {
     /// The sets that a mechanism has.
     #[must_use]
@@ -158,6 +172,7 @@ impl Set {
 
     /// The numbers of a pose that satisfies the constraints: the inverse of [`Set::pose`].
     #[must_use]
+    #[inline(always)]
     pub fn values<T: Trig>(&self, mech: &Mechanism, pose: &Pose<T>) -> Values<T> {
         let mut q = [T::zero(); MAX_COORDINATES];
         let o = pose.o.array();
@@ -277,11 +292,13 @@ impl Plane {
     }
 
     /// From the point of L to the reference point, base axes.
+    #[inline(always)]
     fn middle<T: Trig>(&self, pose: &Pose<T>) -> Vec3<T> {
         pose.o + pose.rotation.of(self.platform_point) - Vec3::lift(self.base_point)
     }
 
     /// (α, β, γ), with α that of the half plane from L to the reference point.
+    #[inline(always)]
     fn angles<T: Trig>(&self, pose: &Pose<T>) -> [T; 3] {
         let middle = Mat3::lift(self.base).transpose_mul(self.middle(pose));
         let alpha = (-middle.y).atan2(middle.z);
@@ -433,36 +450,50 @@ fn parts<T: Real>(a: Vec3<Jet<T>>) -> [Vec3<T>; 3] {
 
 /// The numbers of the set with their rates along a motion: the inverse of [`state`].
 #[must_use]
-pub fn along(mech: &Mechanism, set: &Set, platform: &Motion<f64>) -> Values<Jet<f64>> {
+#[inline(always)]
+pub fn along<V: Ordered>(mech: &Mechanism, set: &Set, platform: &Motion<V>) -> Values<Jet<V>> {
     set.values(mech, &platform.jets())
 }
 
+/// How well given coordinates determine the others: the pivot ratio of what does it, one where there are none.
+#[inline(always)]
+pub fn determined<V: Ordered>(mech: &Mechanism, set: &Set, q: &Values<Jet<V>>, given: &[bool]) -> V {
+    let dependent = Dependent::of(set, given);
+    if dependent.count == 0 {
+        return V::one();
+    }
+    solve(gradient(mech, set, q, &dependent), [V::zero(); MAX_CONSTRAINTS]).pivots
+}
+
 /// The motion with given coordinates that vary as duals; the others, whose values are known, follow so that the
-/// constraints are kept: by one Newton step in duals, which is exact from a solution on \[T56\]. With the pivot ratio of
-/// what determines them.
+/// constraints are kept: by one Newton step in duals, which is exact from a solution on \[T56\].
 #[must_use]
-pub fn varied<S>(
+#[inline(always)]
+pub fn varied<S, V: Ordered>(
     mech: &Mechanism<S>,
     set: &Set<S>,
-    q: &Values<Jet<Dual<f64>>>,
+    q: &Values<Jet<Dual<V>>>,
     given: &[bool],
-) -> (Motion<Dual<f64>>, f64)
+) -> Motion<Dual<V>>
 where
-    S: Constant<Jet<Dual<f64>>> + Constant<Dual<Dual<f64>>>,
+    S: Constant<Jet<Dual<V>>> + Constant<Dual<Dual<V>>>,
 {
     let mut q = *q;
     let dependent = Dependent::of(set, given);
-    if dependent.count == 0 {
-        return (motion(&set.pose(mech, &q)), 1.0);
+    if dependent.count > 0 {
+        let residual = residual(mech, &set.pose(mech, &q));
+        let mut rhs = [Dual::zero(); MAX_CONSTRAINTS];
+        for k in 0..MAX_CONSTRAINTS {
+            rhs[k] = -residual[k].x;
+        }
+        let step = solve(gradient(mech, set, &q, &dependent), rhs).x;
+        for (k, &i) in dependent.numbers().iter().enumerate() {
+            // The values are a solution within rounding: only their derivatives move.
+            q[i] = Jet::new(Dual::new(q[i].x.x, q[i].x.d + step[k].d), Dual::zero(), Dual::zero());
+        }
+        follow(mech, set, &mut q, &dependent);
     }
-    let residual = residual(mech, &set.pose(mech, &q)).map(|g| -g.x);
-    let step = solve(gradient(mech, set, &q, &dependent), residual).x;
-    for (&i, s) in dependent.numbers().iter().zip(step) {
-        // The values are a solution within rounding: only their derivatives move.
-        q[i] = Jet::new(q[i].x + Dual::new(0.0, s.d), Dual::zero(), Dual::zero());
-    }
-    let (pivots, _) = follow(mech, set, &mut q, &dependent);
-    (motion(&set.pose(mech, &q)), pivots)
+    motion(&set.pose(mech, &q))
 }
 
 /// Whether there is a shortest turn from the tool axis at home: not to no direction, and not to the opposite one.
@@ -600,17 +631,6 @@ pub fn solve_dependent<V: Lanes>(
         q[i] = Jet::select(wanted, found, unsolved[i]);
     }
     ([(arrived, Status::NotConverged), (regular, Status::Fold)], sign)
-}
-
-/// Whether it is more than zero in any lane.
-#[inline(always)]
-fn any<V: Lanes>(x: V) -> bool {
-    let (mut row, mut sum) = ([0.0; WIDTH], 0.0);
-    x.store(&mut row);
-    for x in row {
-        sum += x;
-    }
-    sum > 0.0
 }
 
 /// The largest entry's size; NaN if one is.

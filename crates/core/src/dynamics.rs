@@ -1,9 +1,9 @@
 //! Inverse dynamics by virtual power: every link's weight and inertia is carried to the platform's twist by the
 //! transpose of its own Jacobian, then actuators and constraints balance the sum [Eq. 40-43] \[T13\]-\[T17\].
 
-use crate::jacobian::{Matrix6, constraint_rows, scaled};
+use crate::jacobian::{Matrix6, constraint_rows, scaled, scaled_jacobian};
 use crate::leg;
-use crate::linear::solve;
+use crate::linear::{solve, solve_all};
 use crate::mechanism::{Body, Leg, Mechanism, Rod};
 use crate::real::{Constant, Real};
 use crate::spatial::{Acceleration, Mat3, Motion, Pose, Twist, Vec3, Wrench};
@@ -41,13 +41,22 @@ fn inertial_torque<T: Real>(body: &Body, axes: Mat3<T>, omega: Vec3<T>, eps: Vec
 /// The platform's own term of [Eq. 42]: weight, inertia and damping, as a wrench at o.
 #[inline(always)]
 pub fn platform_wrench<T: Real>(mech: &Mechanism<impl Constant<T>>, platform: &Motion<T>) -> Wrench<T> {
+    body_wrench(mech, &mech.platform, platform) + damping_wrench(mech, &platform.twist)
+}
+
+/// Weight and inertia of a body that moves with the platform, as a wrench at o.
+#[inline(always)]
+pub(crate) fn body_wrench<T: Real>(
+    mech: &Mechanism<impl Constant<T>>,
+    body: &Body,
+    platform: &Motion<T>,
+) -> Wrench<T> {
     let Motion { pose, twist, acceleration } = platform;
-    let body = &mech.platform;
     let center = pose.rotation * Vec3::lift(body.center);
     let a = acceleration.a + acceleration.eps.cross(center) + twist.omega.cross(twist.omega.cross(center));
     let force = inertial_force(body, Vec3::lift(mech.gravity), a);
     let torque = inertial_torque(body, pose.rotation, twist.omega, acceleration.eps);
-    Wrench::at(center, force) + Wrench::new(Vec3::zero(), torque) + damping_wrench(mech, twist)
+    Wrench::at(center, force) + Wrench::new(Vec3::zero(), torque)
 }
 
 /// The platform's damping, a part of [Eq. 42]: `f_d = -μ v, t_d = -μ ω`.
@@ -66,10 +75,10 @@ pub(crate) fn leg_wrench<T: Real>(
     platform: &Motion<T>,
 ) -> Wrench<T> {
     let state = leg::moving(leg, place, platform);
-    let mut wrench = links_wrench(mech, leg, &state);
+    let mut wrench = links_wrench(mech, leg, [&leg.cylinder, &leg.piston], &state);
     for rod in &mech.rods {
         if rod.leader == index {
-            wrench = wrench + carried_rod(mech, rod, &state);
+            wrench = wrench + carried_rod(mech, rod, &rod.body, &state);
         }
     }
     wrench
@@ -80,15 +89,16 @@ pub(crate) fn leg_wrench<T: Real>(
 pub(crate) fn links_wrench<T: Real>(
     mech: &Mechanism<impl Constant<T>>,
     leg: &Leg<impl Constant<T>>,
+    [cylinder, piston]: [&Body; 2],
     state: &leg::State<T>,
 ) -> Wrench<T> {
     let axes = state.frame.axes;
     let at_base = axes.transpose_mul(Vec3::lift(mech.gravity));
     let at_b = at_base - axes.transpose_mul(state.end.a_b);
-    let (force, about_b) = turning_force(&leg.piston, &state.turn, at_b);
-    let (_, about_base) = turning_force(&leg.cylinder, &state.turn, at_base);
+    let (force, about_b) = turning_force(piston, &state.turn, at_b);
+    let (_, about_base) = turning_force(cylinder, &state.turn, at_base);
     // Both turn as one.
-    let inertia = leg.piston.inertia + leg.cylinder.inertia;
+    let inertia = piston.inertia + cylinder.inertia;
     let torque = turning_torque(inertia, state.turn.omega, state.turn.eps);
     leg::carry(leg, state, force, torque + about_b + about_base)
 }
@@ -103,27 +113,19 @@ fn turning_force<T: Real>(body: &Body, turn: &leg::Turn<T>, push: Vec3<T>) -> (V
     (force, center.cross(force))
 }
 
-/// A rod, carried to the platform by the leg that leads it.
+/// A rod with the given body, carried to the platform by the leg that leads it.
 #[inline(always)]
 pub(crate) fn carried_rod<T: Real>(
     mech: &Mechanism<impl Constant<T>>,
     rod: &Rod<impl Constant<T>>,
+    body: &Body,
     leader: &leg::State<T>,
 ) -> Wrench<T> {
-    let about = rod_torque(mech, rod, leader);
+    // Torque of its weight and inertia about its line [Eq. 36, 42].
+    let about = Vec3::lift(rod.axis).dot(rod_wrench(mech, rod, body, leader).torque);
     // The rod's power is its torque about L times ω_L = n·δ'/|L×δ|, with δ' = (v_b - ℓ'δ)/ℓ and n square to δ.
     let (p, f) = (&leader.position, &leader.frame);
     Wrench::at(p.e, f.n() * (about / (f.sine * p.length)))
-}
-
-/// Torque of the rod's weight and inertia about its line [Eq. 36, 42].
-#[inline(always)]
-fn rod_torque<T: Real>(
-    mech: &Mechanism<impl Constant<T>>,
-    rod: &Rod<impl Constant<T>>,
-    leader: &leg::State<T>,
-) -> T {
-    Vec3::lift(rod.axis).dot(rod_wrench(mech, rod, leader).torque)
 }
 
 /// The rod's weight and inertia as a wrench at its point, from its turn and its axes (L, n, L×n) [Eq. 36, 42].
@@ -131,16 +133,17 @@ fn rod_torque<T: Real>(
 pub(crate) fn rod_wrench<T: Real>(
     mech: &Mechanism<impl Constant<T>>,
     rod: &Rod<impl Constant<T>>,
+    body: &Body,
     leader: &leg::State<T>,
 ) -> Wrench<T> {
     let (axis, n) = (Vec3::lift(rod.axis), leader.frame.n());
     let turn = leg::rod_turn(axis, leader);
     let (omega, eps) = (axis * turn.rate, axis * turn.acceleration);
     let axes = Mat3::from_columns(axis, n, axis.cross(n));
-    let center = axes * Vec3::lift(rod.body.center);
+    let center = axes * Vec3::lift(body.center);
     let a = eps.cross(center) + omega.cross(omega.cross(center));
-    let force = inertial_force(&rod.body, Vec3::lift(mech.gravity), a);
-    Wrench::new(force, center.cross(force) + inertial_torque(&rod.body, axes, omega, eps))
+    let force = inertial_force(body, Vec3::lift(mech.gravity), a);
+    Wrench::new(force, center.cross(force) + inertial_torque(body, axes, omega, eps))
 }
 
 /// The platform's own term and the load, divided by the paper's efficiency η [Eq. 43].
@@ -218,25 +221,46 @@ impl<T: Real> Balance<T> {
     #[inline(always)]
     pub fn solved<S: Constant<T>>(mut self, mech: &Mechanism<S>, pose: &Pose<T>) -> ([T; 6], T::Value) {
         constraint_rows(mech, pose, &mut self.rows[self.count..]);
-        balanced(mech, transposed(&scaled(mech, self.rows)), self.wrench)
+        let w = self.wrench;
+        let scaled_wrench = Wrench::new(w.force, w.torque * T::lit(1.0 / mech.characteristic_length));
+        let mut rhs = scaled_wrench.array();
+        for x in &mut rhs {
+            *x = -*x;
+        }
+        let solved = solve(transposed(&scaled(mech, self.rows)), rhs);
+        (solved.x, solved.pivots)
     }
 }
 
-/// Active forces and multipliers that balance a wrench on the platform at o, with the pivot ratio of J \[T15\]. The
-/// columns are those of the transposed scaled Jacobian.
-#[inline(always)]
-pub(crate) fn balanced<T: Real>(
-    mech: &Mechanism<impl Constant<T>>,
+/// What balances any wrench on the platform at o: active forces and multipliers for each unit force and torque \[T15\].
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Answering<T: Real> {
     columns: Matrix6<T>,
-    w: Wrench<T>,
-) -> ([T; 6], T::Value) {
-    let scaled = Wrench::new(w.force, w.torque * T::lit(1.0 / mech.characteristic_length));
-    let mut rhs = scaled.array();
-    for x in &mut rhs {
-        *x = -*x;
+    pub pivots: T::Value,
+}
+
+impl<T: Real> Answering<T> {
+    #[inline(always)]
+    pub(crate) fn at(mech: &Mechanism<impl Constant<T>>, pose: &Pose<T>) -> Self {
+        let inverse = T::lit(1.0 / mech.characteristic_length);
+        let mut rhs = [[T::zero(); 6]; 6];
+        for k in 0..6 {
+            rhs[k][k] = if k < 3 { -T::one() } else { -inverse };
+        }
+        let solved = solve_all(transposed(&scaled_jacobian(mech, pose)), rhs);
+        Answering { columns: solved.x, pivots: solved.pivots }
     }
-    let solved = solve(columns, rhs);
-    (solved.x, solved.pivots)
+
+    #[inline(always)]
+    pub(crate) fn to(&self, w: Wrench<T>) -> [T; 6] {
+        let (w, mut sum) = (w.array(), [T::zero(); 6]);
+        for k in 0..6 {
+            for i in 0..6 {
+                sum[i] = self.columns[k][i].mul_add(w[k], sum[i]);
+            }
+        }
+        sum
+    }
 }
 
 #[inline(always)]

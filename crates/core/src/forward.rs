@@ -7,7 +7,7 @@ use crate::constraint;
 use crate::leg;
 use crate::linear::solve;
 use crate::mechanism::Mechanism;
-use crate::real::Real;
+use crate::real::{Ordered, Real};
 use crate::spatial::{Pose, Twist, Vec3, Wrench};
 use crate::status::Status;
 
@@ -272,10 +272,25 @@ pub fn polish(mech: &Mechanism, squares: &[f64; 6], guess: &Pose<f64>) -> Found 
     Found { pose, residual: error(mech, squares, &pose), iterations, sign: at.sign, status }
 }
 
-/// The largest error of a length or of a constraint, m.
+/// The largest error of a length or of a constraint, m; NaN where one is not known.
+#[inline(always)]
 #[must_use]
-pub fn error(mech: &Mechanism, squares: &[f64; 6], pose: &Pose<f64>) -> f64 {
-    let legs = mech.actuated().zip(squares);
-    let errors = legs.map(|((_, leg), square)| (leg::position(leg, pose).length - square.sqrt()).abs());
-    errors.fold(constraint::largest_distance(mech, pose), |m, e| if e > m || e.is_nan() { e } else { m })
+pub fn error<V: Ordered>(mech: &Mechanism, squares: &[V; 6], pose: &Pose<V>) -> V {
+    let (mut errors, mut count) = ([V::zero(); 6], 0);
+    for leg in &mech.legs {
+        if leg.actuated {
+            errors[count] = (leg::position(leg, pose).length - squares[count].sqrt()).abs();
+            count += 1;
+        }
+    }
+    for c in &mech.independent {
+        errors[count] = constraint::distance(c, pose, mech.characteristic_length);
+        count += 1;
+    }
+    let (mut largest, mut unknown) = (V::zero(), V::zero());
+    for e in errors {
+        largest = largest.most(e);
+        unknown = unknown + e * V::zero();
+    }
+    largest + unknown
 }

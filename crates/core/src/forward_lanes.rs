@@ -14,18 +14,29 @@ use crate::status::Status;
 /// The columns of R and o of each.
 pub(crate) type Poses = [Row; 12];
 
+/// Lengths of the actuated legs, and a guess.
+pub type Asked = (Vec<f64>, Pose<f64>);
+
+/// The squared lengths of at most [`WIDTH`] states, one in each lane.
+pub(crate) fn squares_of(states: &[Asked]) -> [Row; 6] {
+    let mut rows = [[0.0; WIDTH]; 6];
+    for (k, (lengths, _)) in states.iter().enumerate() {
+        for (row, square) in rows.iter_mut().zip(squares(lengths)) {
+            row[k] = square;
+        }
+    }
+    rows
+}
+
 /// [`forward_kinematics`](crate::forward::forward_kinematics) of at most [`WIDTH`] states, each as if it were alone.
 ///
 /// # Panics
 /// If there are more.
 #[must_use]
-pub fn forward_kinematics_of(mech: &Mechanism, states: &[(Vec<f64>, Pose<f64>)]) -> Vec<Found> {
-    let (mut poses, mut to) = ([[0.0; WIDTH]; 12], [[0.0; WIDTH]; 6]);
-    for (k, (lengths, guess)) in states.iter().enumerate() {
+pub fn forward_kinematics_of(mech: &Mechanism, states: &[Asked]) -> Vec<Found> {
+    let (mut poses, to) = ([[0.0; WIDTH]; 12], squares_of(states));
+    for (k, (_, guess)) in states.iter().enumerate() {
         put(&mut poses, k, guess);
-        for (row, square) in to.iter_mut().zip(squares(lengths)) {
-            row[k] = square;
-        }
     }
     let mut lanes: Vec<Lane> = states.iter().map(|(lengths, _)| Lane::new(lengths)).collect();
     let mut at = Newtons::default();
@@ -39,8 +50,33 @@ pub fn forward_kinematics_of(mech: &Mechanism, states: &[(Vec<f64>, Pose<f64>)])
             }
         }
     }
-    let solved = lanes.iter().zip(states).enumerate();
-    solved.map(|(k, (lane, (lengths, guess)))| lane.found(mech, lengths, guess, &get(&poses, k))).collect()
+    let mut errors = [0.0; WIDTH];
+    lanes::dispatch(Errors { mech, poses: &poses, squares: &to, result: &mut errors });
+    let lanes = lanes.iter().zip(states).enumerate();
+    let found = |(k, (lane, (lengths, guess))): (usize, (&Lane, &Asked))| {
+        lane.found(mech, lengths, guess, &get(&poses, k), errors[k])
+    };
+    lanes.map(found).collect()
+}
+
+/// The errors of poses side by side.
+struct Errors<'a> {
+    mech: &'a Mechanism,
+    poses: &'a Poses,
+    squares: &'a [Row; 6],
+    result: &'a mut Row,
+}
+
+impl Task for Errors<'_> {
+    #[inline(always)]
+    fn run<V: Lanes>(self) {
+        let mut k = 0;
+        while k < WIDTH {
+            let squares = load_squares(self.squares, k);
+            error::<V>(self.mech, &squares, &load(self.poses, k)).store(&mut self.result[k..]);
+            k += V::WIDTH;
+        }
+    }
 }
 
 /// How far one state has come.
@@ -153,21 +189,21 @@ impl Lane {
     }
 
     /// What it has come to, by way of one state alone where it has left the others.
-    fn found(&self, mech: &Mechanism, lengths: &[f64], guess: &Pose<f64>, pose: &Pose<f64>) -> Found {
-        let squares = squares(lengths);
+    fn found(
+        &self,
+        mech: &Mechanism,
+        lengths: &[f64],
+        guess: &Pose<f64>,
+        pose: &Pose<f64>,
+        residual: f64,
+    ) -> Found {
         match self.stage {
             Stage::Solved(status) => {
-                let residual = error(mech, &squares, pose);
-                Found {
-                    pose: *pose,
-                    residual,
-                    iterations: self.piece.steps as u32,
-                    sign: self.piece.sign,
-                    status,
-                }
+                let (iterations, sign) = (self.piece.steps as u32, self.piece.sign);
+                Found { pose: *pose, residual, iterations, sign, status }
             }
             Stage::Rounding => {
-                let found = polish(mech, &squares, pose);
+                let found = polish(mech, &squares(lengths), pose);
                 Found { iterations: self.piece.steps as u32 + found.iterations, ..found }
             }
             Stage::Going | Stage::Arrived | Stage::Left => forward_kinematics(mech, lengths, guess),
@@ -187,11 +223,7 @@ pub(crate) struct Newton<V> {
 
 #[inline(always)]
 pub(crate) fn newton<V: Lanes>(mech: &Mechanism, pose: &Pose<V>, squares: &[Row; 6], k: usize) -> Newton<V> {
-    let mut to = [V::zero(); 6];
-    for i in 0..6 {
-        to[i] = V::load(&squares[i][k..]);
-    }
-    let System { residual, matrix } = system(mech, pose, &to);
+    let System { residual, matrix } = system(mech, pose, &load_squares(squares, k));
     let (mut rhs, mut largest, mut sum) = (residual, V::zero(), V::zero());
     for f in &mut rhs {
         largest = largest.most(f.abs());
@@ -203,6 +235,15 @@ pub(crate) fn newton<V: Lanes>(mech: &Mechanism, pose: &Pose<V>, squares: &[Row;
     }
     let next = pose.stepped(&step_of(mech, x, V::one()));
     Newton { next, size: sum.sqrt(), residual: largest, pivots, sign }
+}
+
+#[inline(always)]
+fn load_squares<V: Lanes>(squares: &[Row; 6], k: usize) -> [V; 6] {
+    let mut loaded = [V::zero(); 6];
+    for i in 0..6 {
+        loaded[i] = V::load(&squares[i][k..]);
+    }
+    loaded
 }
 
 /// Newton steps side by side.

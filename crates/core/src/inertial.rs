@@ -1,12 +1,11 @@
 //! Inertial parameters of the links, and the regressor: forces are linear in the parameters, so that their
 //! coefficients are the forces of unit parameters \[T57\].
 
-use crate::dynamics;
-use crate::jacobian::scaled_jacobian;
+use crate::dynamics::{self, Answering};
 use crate::leg;
 use crate::mechanism::{Body, Leg, Mechanism, Turning};
 use crate::real::{Dual, Real};
-use crate::spatial::{Mat3, Motion, Vec3, Wrench};
+use crate::spatial::{Mat3, Motion, Twist, Vec3, Wrench};
 
 /// A link that may have mass.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -123,7 +122,7 @@ fn standard<T: Real>([m, x, y, z, inertia @ ..]: [T; NUMBERS]) -> [T; NUMBERS] {
 
 /// The body with one standard parameter of one, and for a first moment with a mass of one, too.
 fn unit_body(number: usize) -> Body {
-    let mut body = Body { mass: 0.0, center: Vec3::zero(), inertia: Mat3([Vec3::zero(); 3]) };
+    let mut body = NO_BODY;
     let mut rows = [[0.0; 3]; 3];
     match number {
         0 => body.mass = 1.0,
@@ -159,98 +158,92 @@ fn body(mech: &Mechanism, link: Link) -> &Body {
     }
 }
 
-fn body_mut(mech: &mut Mechanism, link: Link) -> &mut Body {
-    match link {
-        Link::Platform => &mut mech.platform,
-        Link::Cylinder(i) => &mut mech.legs[i].cylinder,
-        Link::Piston(i) => &mut mech.legs[i].piston,
-        Link::Rod(i) => &mut mech.rods[i].body,
-    }
-}
-
-/// Forces of unit parameters, from the mechanism with one body at a time.
+/// Forces of unit parameters.
 pub struct Regressor {
     pub parameters: Vec<Parameter>,
-    /// Without bodies.
-    damped: Mechanism,
-    /// Without damping either.
-    bare: Mechanism,
+    /// The bodies whose wrenches, with these signs, are that of each parameter's unit.
+    units: Vec<Vec<(f64, Body)>>,
+    /// From columns of Y to the derivatives by the file's numbers: columns and their factors, for each.
+    by_bodies: Vec<Vec<(usize, f64)>>,
 }
 
 impl Regressor {
     #[must_use]
     pub fn new(mech: &Mechanism) -> Self {
         let parameters = parameters(mech);
-        let mut damped = mech.clone();
-        for p in &parameters {
-            *body_mut(&mut damped, p.link) = no_body();
-        }
-        let mut bare = damped.clone();
-        (bare.linear_damping, bare.angular_damping) = (0.0, 0.0);
-        Regressor { parameters, damped, bare }
-    }
-
-    /// For each parameter the active forces and multipliers that its unit asks for: a column of Y \[T57\].
-    pub fn columns(&mut self, platform: &Motion<f64>) -> Vec<[f64; 6]> {
-        let legs: Vec<_> = self.bare.legs.iter().map(|leg| leg::state(leg, platform)).collect();
-        let jacobian = dynamics::transposed(&scaled_jacobian(&self.bare, &platform.pose));
-        let mut columns = Vec::with_capacity(self.parameters.len());
-        for i in 0..self.parameters.len() {
-            let p = self.parameters[i];
-            let wrenches = p.numbers.iter().map(|&k| self.wrench(p.link, k, platform, &legs));
-            let wrench = wrenches.fold(Wrench::zero(), |sum, w| sum + w);
-            columns.push(dynamics::balanced(&self.bare, jacobian, wrench).0);
-        }
-        columns
-    }
-
-    /// What the unit of a standard parameter puts on the platform, its link being the only one with a body.
-    fn wrench(
-        &mut self,
-        link: Link,
-        number: usize,
-        platform: &Motion<f64>,
-        legs: &[leg::State<f64>],
-    ) -> Wrench<f64> {
-        let mut of = |number: usize| {
-            *body_mut(&mut self.bare, link) = unit_body(number);
-            let mech = &self.bare;
-            let wrench = match link {
-                Link::Platform => dynamics::own_wrench(mech, platform, Wrench::zero()),
-                Link::Cylinder(i) | Link::Piston(i) => dynamics::links_wrench(mech, &mech.legs[i], &legs[i]),
-                Link::Rod(i) => dynamics::carried_rod(mech, &mech.rods[i], &legs[mech.rods[i].leader]),
-            };
-            *body_mut(&mut self.bare, link) = no_body();
-            wrench
+        let unit = |&k: &usize| {
+            // A first moment has a mass of one with it, which is taken off.
+            let first_moment = (1..=3).contains(&k);
+            [Some((1.0, unit_body(k))), first_moment.then(|| (-1.0, unit_body(0)))].into_iter().flatten()
         };
-        let wrench = of(number);
-        if (1..=3).contains(&number) { wrench + of(0) * -1.0 } else { wrench }
-    }
-
-    /// The active forces and multipliers of load and damping alone: what forces are with all parameters zero.
-    #[must_use]
-    pub fn offset(&self, platform: &Motion<f64>, load: Wrench<f64>) -> [f64; 6] {
-        dynamics::inverse_dynamics(&self.damped, platform, load).0
-    }
-
-    /// From columns of Y to the derivatives by mass, mass centre, and inertia about it, of the same parameters in
-    /// order \[T57\].
-    #[must_use]
-    pub fn by_bodies(&self, mech: &Mechanism, columns: &[[f64; 6]]) -> Vec<[f64; 6]> {
+        let units: Vec<_> = parameters.iter().map(|p| p.numbers.iter().flat_map(unit).collect()).collect();
         let derivative = |p: &Parameter| {
             let mut seeded = central(body(mech, p.link)).map(|x| Dual::new(x, 0.0));
             p.numbers.iter().for_each(|&k| seeded[k].d = 1.0);
             let rates = standard(seeded).map(|x| x.d);
-            let mut sum = [0.0; 6];
-            for (other, column) in self.parameters.iter().zip(columns).filter(|(q, _)| q.link == p.link) {
-                sum = std::array::from_fn(|i| sum[i] + column[i] * rates[other.numbers[0]]);
-            }
-            sum
+            let of_link = parameters.iter().enumerate().filter(|(_, q)| q.link == p.link);
+            let factors = of_link.map(|(at, q)| (at, rates[q.numbers[0]]));
+            factors.filter(|(_, rate)| *rate != 0.0).collect()
         };
-        self.parameters.iter().map(derivative).collect()
+        let by_bodies = parameters.iter().map(derivative).collect();
+        Regressor { parameters, units, by_bodies }
+    }
+
+    /// For each parameter the active forces and multipliers that its unit asks for: the columns of Y \[T57\].
+    pub fn columns(&self, mech: &Mechanism, platform: &Motion<f64>) -> Vec<[f64; 6]> {
+        let legs: Vec<_> = mech.legs.iter().map(|leg| leg::state(leg, platform)).collect();
+        let answering = Answering::at(mech, &platform.pose);
+        (0..self.parameters.len()).map(|k| self.column(mech, platform, &legs, &answering, k)).collect()
+    }
+
+    /// The k-th column, from the states of all legs.
+    #[inline(always)]
+    pub(crate) fn column<T: Real>(
+        &self,
+        mech: &Mechanism,
+        platform: &Motion<T>,
+        legs: &[leg::State<T>],
+        answering: &Answering<T>,
+        k: usize,
+    ) -> [T; 6] {
+        let mut sum = Wrench::zero();
+        for (sign, body) in &self.units[k] {
+            let wrench = match self.parameters[k].link {
+                Link::Platform => dynamics::body_wrench(mech, body, platform) * T::lit(1.0 / mech.efficiency),
+                Link::Cylinder(i) => dynamics::links_wrench(mech, &mech.legs[i], [body, &NO_BODY], &legs[i]),
+                Link::Piston(i) => dynamics::links_wrench(mech, &mech.legs[i], [&NO_BODY, body], &legs[i]),
+                Link::Rod(i) => dynamics::carried_rod(mech, &mech.rods[i], body, &legs[mech.rods[i].leader]),
+            };
+            sum = sum + wrench * T::lit(*sign);
+        }
+        answering.to(sum)
+    }
+
+    /// What load and damping ask for: the active forces and multipliers with all parameters zero.
+    #[inline(always)]
+    pub(crate) fn offset<T: Real>(
+        mech: &Mechanism,
+        twist: &Twist<T>,
+        load: Wrench<T>,
+        answering: &Answering<T>,
+    ) -> [T; 6] {
+        answering.to((load + dynamics::damping_wrench(mech, twist)) * T::lit(1.0 / mech.efficiency))
+    }
+
+    /// From the columns of Y to the k-th of the derivatives by mass, mass centre, and inertia about it \[T57\].
+    #[inline(always)]
+    pub(crate) fn by_bodies<T: Real>(&self, columns: &[[T; 6]], k: usize) -> [T; 6] {
+        let mut sum = [T::zero(); 6];
+        for &(column, factor) in &self.by_bodies[k] {
+            for i in 0..6 {
+                sum[i] = sum[i] + columns[column][i].scale(factor);
+            }
+        }
+        sum
     }
 }
 
-fn no_body() -> Body {
-    Body { mass: 0.0, center: Vec3::zero(), inertia: Mat3([Vec3::zero(); 3]) }
-}
+const NO_BODY: Body = {
+    let zero = Vec3 { x: 0.0, y: 0.0, z: 0.0 };
+    Body { mass: 0.0, center: zero, inertia: Mat3([zero; 3]) }
+};

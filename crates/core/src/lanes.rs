@@ -32,6 +32,12 @@ pub trait Lanes: Ordered {
 
     fn store(self, to: &mut [f64]);
 
+    /// Does a work in a function of its own, compiled for the register: what is long and called at several places.
+    #[inline(always)]
+    fn apart<W: Work<Self>>(work: W) -> W::Result {
+        work.run()
+    }
+
     /// From states one after the other, of which each has `N` numbers, to numbers of [`Lanes::WIDTH`] states side by side.
     #[inline(always)]
     fn gather<const N: usize>(states: &[f64]) -> [Self; N] {
@@ -60,6 +66,17 @@ pub trait Lanes: Ordered {
     }
 }
 
+/// Whether it is more than zero in any lane.
+#[inline(always)]
+pub(crate) fn any<V: Lanes>(x: V) -> bool {
+    let (mut row, mut sum) = ([0.0; WIDTH], 0.0);
+    x.store(&mut row);
+    for x in row {
+        sum += x;
+    }
+    sum > 0.0
+}
+
 /// The register of a processor without vectors.
 impl Lanes for f64 {
     const WIDTH: usize = 1;
@@ -78,6 +95,14 @@ impl Lanes for f64 {
 pub trait Task {
     /// Must be `#[inline(always)]` with all that it calls, so that it is compiled for each instruction set.
     fn run<V: Lanes>(self);
+}
+
+/// What is to be done with registers of one kind.
+pub trait Work<V> {
+    type Result;
+
+    /// Must be `#[inline(always)]` with all that it calls.
+    fn run(self) -> Self::Result;
 }
 
 /// Instruction sets of this kind of processor with the width of their registers, the narrowest first.
@@ -264,6 +289,15 @@ macro_rules! register {
             fn store(self, to: &mut [f64]) {
                 assert!(to.len() >= $width);
                 unsafe { $store(to.as_mut_ptr(), self.0) }
+            }
+            #[inline(always)]
+            fn apart<W: $crate::lanes::Work<Self>>(work: W) -> W::Result {
+                #[inline(never)]
+                #[target_feature(enable = $features)]
+                fn called<W: $crate::lanes::Work<$name>>(work: W) -> W::Result {
+                    work.run()
+                }
+                unsafe { called(work) }
             }
             $($own)*
         }

@@ -375,15 +375,6 @@ pub fn binding(mech: &Mechanism, margins: &[f64]) -> Option<usize> {
     (!binding.limit.is_nan()).then_some(binding.limit as usize)
 }
 
-/// What kinematics calls a pose: the first limit of a joint that it breaks, strokes before cones before angles. The
-/// limits come in the mechanism's order with their margins.
-pub fn status<'a>(limits: impl Iterator<Item = (&'a Limit, f64)>) -> Status {
-    limits
-        .map(|(limit, margin)| if margin >= 0.0 { Status::Ok } else { limit.status() })
-        .find(|&status| status != Status::Ok)
-        .unwrap_or(Status::Ok)
-}
-
 // --- the list of a mechanism ---------------------------------------------------------------------------------
 
 /// The stretch of a strut at its joint that does not count is by default this many times as long as its radius and the

@@ -135,26 +135,27 @@ impl<T: Real> Constant<T> for f64 {
     }
 }
 
-impl Constant<Self> for Dual<f64> {
+/// For one number or one in each lane.
+impl<V: Ordered> Constant<Dual<V>> for Dual<f64> {
     #[inline(always)]
-    fn lift(self) -> Self {
-        self
+    fn lift(self) -> Dual<V> {
+        Dual::new(V::lit(self.x), V::lit(self.d))
     }
 }
 
 /// The same in any direction that the outer number differentiates by.
-impl Constant<Dual<Self>> for Dual<f64> {
+impl<V: Ordered> Constant<Dual<Dual<V>>> for Dual<f64> {
     #[inline(always)]
-    fn lift(self) -> Dual<Self> {
-        Dual::new(self, Self::zero())
+    fn lift(self) -> Dual<Dual<V>> {
+        Dual::new(self.lift(), Dual::zero())
     }
 }
 
 /// At rest along a motion.
-impl Constant<Jet<Self>> for Dual<f64> {
+impl<V: Ordered> Constant<Jet<Dual<V>>> for Dual<f64> {
     #[inline(always)]
-    fn lift(self) -> Jet<Self> {
-        Jet::new(self, Self::zero(), Self::zero())
+    fn lift(self) -> Jet<Dual<V>> {
+        Jet::new(self.lift(), Dual::zero(), Dual::zero())
     }
 }
 

@@ -9,7 +9,7 @@ use std::time::Instant;
 
 use common::{published, states};
 use polypod_core::batch::{self, Coordinates, Loads, States, Table};
-use polypod_core::coordinates::Set;
+use polypod_core::coordinates::{self, Set};
 use polypod_core::dynamics;
 use polypod_core::mechanism::Mechanism;
 use polypod_core::spatial::Motion;
@@ -57,7 +57,7 @@ impl Arrays {
 
 type Operation = fn(&Mechanism, &Arrays) -> Table;
 
-const OPERATIONS: [(&str, Operation); 10] = [
+const OPERATIONS: [(&str, Operation); 13] = [
     ("inverse kinematics", |mech, a| batch::inverse_kinematics(mech, &a.poses)),
     ("Jacobian", |mech, a| batch::jacobians(mech, &a.poses)),
     ("Hessian", |mech, a| batch::hessians(mech, &a.poses)),
@@ -75,6 +75,13 @@ const OPERATIONS: [(&str, Operation); 10] = [
     ("forward dynamics", |mech, a| {
         batch::forward_dynamics(mech, &a.poses, &a.twists, &a.of_legs, &Loads::Own)
     }),
+    ("joint reactions", |mech, a| batch::joint_reactions(mech, &a.states(), &Loads::Own, 1.0)),
+    ("derivatives", |mech, a| {
+        let set = Set::of(mech)[0];
+        let given = coordinates::best_given(mech, &set);
+        batch::inverse_dynamics_derivatives(mech, &a.states(), &Loads::Own, &set, &given)
+    }),
+    ("regressor", |mech, a| batch::regressors(mech, &a.states(), &Loads::Own)),
 ];
 
 /// Both in one test: nothing else is to allocate or to run beside them.

@@ -3,13 +3,15 @@
 // Arguments arrive from Python by value.
 #![allow(clippy::needless_pass_by_value)]
 
+mod arrays;
 mod derivatives;
 mod simulation;
 mod workspace;
 
 use std::sync::OnceLock;
 
-use numpy::{PyArray1, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
+use arrays::{Array, PyAxes, arrays, arrays_but, batch_of, slice};
+use numpy::{PyArray1, PyArrayMethods};
 use polypod_core::assembly::assemble;
 use polypod_core::batch::{self, Coordinates, Loads, Space, States, Table};
 use polypod_core::coordinates::Set;
@@ -40,20 +42,9 @@ pyo3::create_exception!(
     "All faults of a mechanism as (place, message)."
 );
 
-/// States one after the other, whatever the shape of the batch.
-type Array<'py> = PyReadonlyArrayDyn<'py, f64>;
-
 /// The one place where errors of the core become errors of Python.
 fn raise(faults: Vec<Fault>) -> PyErr {
     Faults::new_err((faults.into_iter().map(|f| (f.place, f.message)).collect::<Vec<_>>(),))
-}
-
-fn slice<'a>(array: &'a Array<'_>) -> PyResult<&'a [f64]> {
-    // Columns one after the other are contiguous, too, and would be read in the wrong order.
-    if !array.is_c_contiguous() {
-        return Err(PyValueError::new_err("needs a contiguous array"));
-    }
-    array.as_slice().map_err(|_| PyValueError::new_err("needs a contiguous array"))
 }
 
 /// `len(poses) / 16` states; every other array must fit them.
@@ -62,34 +53,6 @@ fn expect(array: &[f64], width: usize, poses: &[f64]) -> PyResult<()> {
         return Err(PyValueError::new_err("arrays do not have one row for each pose"));
     }
     Ok(())
-}
-
-/// Numbers that are sooner copied than handed over.
-const SMALL: usize = 1024;
-
-/// Leading axes of an array whose states have so many axes themselves: those of its batch.
-fn batch_of(array: &Array<'_>, axes: usize) -> Vec<usize> {
-    let shape = array.shape();
-    shape[..shape.len().saturating_sub(axes)].to_vec()
-}
-
-/// Arrays by name and their status, with the axes of the batch before those of a state.
-fn arrays<'py>(py: Python<'py>, table: Table, batch: &[usize]) -> PyResult<Bound<'py, PyDict>> {
-    let result = PyDict::new(py);
-    for field in table.fields {
-        let shape = [batch, &field.shape].concat();
-        if field.data.len() <= SMALL {
-            let array = PyArrayDyn::<f64>::zeros(py, shape, false);
-            // SAFETY: nobody else has it yet.
-            unsafe { array.as_slice_mut()? }.copy_from_slice(&field.data);
-            result.set_item(field.name, array)?;
-        } else {
-            result.set_item(field.name, PyArray1::from_vec(py, field.data).reshape(shape)?)?;
-        }
-    }
-    let status: Vec<u8> = table.status.iter().map(|&s| s as u8).collect();
-    result.set_item("status", PyArray1::from_vec(py, status).reshape(batch.to_vec())?)?;
-    Ok(result)
 }
 
 type LimitRow = (String, &'static str, Vec<usize>, &'static str, f64, f64, f64);
@@ -188,19 +151,20 @@ impl PyMechanism {
         serde_json::to_string(&self.0.mobility).map_err(|e| PyValueError::new_err(e.to_string()))
     }
 
-    #[pyo3(signature = (set, given, count, branch, guess, continued))]
+    /// For a batch with these axes.
+    #[pyo3(signature = (set, given, batch, branch, guess, continued))]
     #[allow(clippy::too_many_arguments)]
     fn states<'py>(
         &self,
         py: Python<'py>,
         set: &str,
         given: Vec<Option<[Array<'py>; 3]>>,
-        count: usize,
+        batch: Vec<usize>,
         branch: f64,
         guess: Option<Array<'py>>,
         continued: bool,
     ) -> PyResult<Bound<'py, PyDict>> {
-        let set = self.set(set)?;
+        let (set, count) = (self.set(set)?, batch.iter().product());
         if given.len() != set.names().len() {
             return Err(PyValueError::new_err("needs one entry for each number of the set"));
         }
@@ -225,7 +189,7 @@ impl PyMechanism {
         }
         let input = Coordinates { set, given: series, branch, guess, continued };
         let table = py.detach(|| batch::states(&self.0, &input, count));
-        arrays(py, table, &[count])
+        arrays(py, table, &batch)
     }
 
     fn coordinates<'py>(
@@ -416,8 +380,11 @@ impl PyMechanism {
         wrenches: Option<Array<'py>>,
         platform_axes: bool,
     ) -> PyResult<Bound<'py, PyDict>> {
-        let motion = [&poses, &twists, &accelerations];
-        self.loaded(py, motion, wrenches.as_ref(), platform_axes, batch::limits)
+        let batch = batch_of(&poses, 2);
+        let states = states(&poses, &twists, &accelerations)?;
+        let loads = loads(wrenches.as_ref(), platform_axes, states.poses)?;
+        let table = py.detach(|| batch::limits(&self.0, &states, &loads));
+        arrays_but(py, table, &batch, ["within"], ["binding"])
     }
 
     #[pyo3(signature = (poses, twists, accelerations, wrenches, platform_axes, length))]
@@ -436,7 +403,7 @@ impl PyMechanism {
         let states = states(&poses, &twists, &accelerations)?;
         let loads = loads(wrenches.as_ref(), platform_axes, states.poses)?;
         let table = py.detach(|| batch::joint_reactions(&self.0, &states, &loads, length));
-        arrays(py, table, &batch)
+        arrays_but(py, table, &batch, ["determinate", "determinate_in_joint"], [])
     }
 
     /// Name, kind and links (towards the base, away from it) of each joint.
@@ -615,6 +582,7 @@ fn use_instructions(name: &str) -> bool {
 fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add("__version__", env!("CARGO_PKG_VERSION"))?;
     m.add("Faults", m.py().get_type::<Faults>())?;
+    m.add_class::<PyAxes>()?;
     m.add_class::<PyMechanism>()?;
     m.add_function(wrap_pyfunction!(derivatives::inverse_dynamics_derivatives, m)?)?;
     m.add_function(wrap_pyfunction!(derivatives::regressor, m)?)?;

@@ -11,8 +11,9 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from polypod.arrays import check_wrench_axes
 from polypod.errors import MissingEngineError, PolypodError, ShapeError, UnknownNameError
-from polypod.mechanism import Mechanism, check_wrench_axes
+from polypod.mechanism import Mechanism
 from polypod.motion import Motion
 from polypod.multibody.tree import Multibody, describe
 from polypod.solution import states_along
@@ -388,7 +389,7 @@ def _own_answers(mech: Mechanism, states: States) -> tuple[Values, NDArray[np.in
     dynamics = mech.inverse_dynamics(*motion, *states.load)
     mobility = mech.mobility()
     values: Values = {
-        name: array for name, array in kinematics._asdict().items() if name in QUANTITIES and array.shape[1]
+        name: array for name, array in kinematics.arrays.items() if name in QUANTITIES and array.shape[1]
     }
     values["platform_acceleration"] = states.acceleration[:, :3]
     values["platform_eps"] = states.acceleration[:, 3:]

@@ -27,6 +27,29 @@ pub(super) trait Operation<const N: usize>: Sync {
     fn run<V: Lanes>(&self, at: At, answers: &mut Answers<'_, N>) -> Codes<V>;
 }
 
+/// The same in room that is made once for many blocks, so that no state allocates.
+pub(super) trait Working<const N: usize>: Sync {
+    type Room<V: Lanes>;
+
+    fn room<V: Lanes>(&self) -> Self::Room<V>;
+
+    /// See [`Operation::run`].
+    fn run<V: Lanes>(&self, room: &mut Self::Room<V>, at: At, answers: &mut Answers<'_, N>) -> Codes<V>;
+}
+
+/// An operation needs none.
+impl<O: Operation<N>, const N: usize> Working<N> for O {
+    type Room<V: Lanes> = ();
+
+    #[inline(always)]
+    fn room<V: Lanes>(&self) {}
+
+    #[inline(always)]
+    fn run<V: Lanes>(&self, (): &mut (), at: At, answers: &mut Answers<'_, N>) -> Codes<V> {
+        Operation::run(self, at, answers)
+    }
+}
+
 /// The status of each lane, as its number: a negative one where numbers are answered though it does not stand.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Codes<V>(V);
@@ -179,11 +202,21 @@ impl<const N: usize> Answers<'_, N> {
             values[k].store(&mut rows[k].0[self.lane..]);
         }
     }
+
+    /// Keeps what has been written in the field where it is `known`: elsewhere it becomes NaN.
+    #[inline(always)]
+    pub(super) fn keep<V: Lanes>(&mut self, field: FieldId, known: V::Mask) {
+        let end = self.starts.get(field.0 + 1).map_or(self.rows.len(), |&start| start);
+        for row in &mut self.rows[self.starts[field.0]..end] {
+            let numbers = &mut row.0[self.lane..];
+            V::select(known, V::load(numbers), V::lit(f64::NAN)).store(numbers);
+        }
+    }
 }
 
 /// The answers for all states.
 pub(super) fn table<const N: usize>(
-    operation: &impl Operation<N>,
+    operation: &impl Working<N>,
     states: usize,
     fields: [(&'static str, Vec<usize>); N],
 ) -> Table {
@@ -355,7 +388,7 @@ struct Blocks<'a, O, const N: usize> {
     part: Part<'a, N>,
 }
 
-impl<O: Operation<N>, const N: usize> Task for Blocks<'_, O, N> {
+impl<O: Working<N>, const N: usize> Task for Blocks<'_, O, N> {
     #[inline(always)]
     fn run<V: Lanes>(self) {
         let Blocks { operation, part } = self;
@@ -364,7 +397,7 @@ impl<O: Operation<N>, const N: usize> Task for Blocks<'_, O, N> {
             count += width;
             count - width
         });
-        let mut rows = vec![Line([0.0; WIDTH]); count];
+        let (mut rows, mut room) = (vec![Line([0.0; WIDTH]); count], operation.room::<V>());
         for block in 0..part.status.len().div_ceil(WIDTH) {
             let first = block * WIDTH;
             let status = &mut part.status[first..];
@@ -373,7 +406,7 @@ impl<O: Operation<N>, const N: usize> Task for Blocks<'_, O, N> {
             for lane in (0..held).step_by(V::WIDTH) {
                 let at = At { first: part.first + first + lane, last: part.states - 1 };
                 let mut answers = Answers { rows: &mut rows, starts: &starts, lane };
-                operation.run::<V>(at, &mut answers).0.store(&mut codes[lane..]);
+                operation.run(&mut room, at, &mut answers).0.store(&mut codes[lane..]);
             }
             let mut answered = [false; WIDTH];
             for lane in 0..held {

@@ -1,16 +1,16 @@
 //! Derivatives of inverse dynamics, and the regressor, of many states.
 
-use super::block::{self, At, Pieces, Rows};
-use super::checks::{limit_status, outcome, then};
+use super::block::{self, Answers, At, Codes, Working};
+use super::checks::{solved, within_limits};
 use super::{FieldId, Loads, States, Table};
-use crate::coordinates::{self, MAX_COORDINATES, Set};
-use crate::derivatives::{self, Part};
-use crate::dynamics;
+use crate::coordinates::{self, DEPENDENT_PIVOTS, MAX_COORDINATES, Set};
+use crate::derivatives::{self, Column, DIRECTIONS, Given, Solved, Varied};
+use crate::dynamics::{Answering, resultant};
 use crate::geometry;
 use crate::inertial::{self, Regressor};
+use crate::lanes::Lanes;
+use crate::leg;
 use crate::mechanism::Mechanism;
-use crate::real::Dual;
-use crate::spatial::{Motion, Pose, Vec3, Wrench};
 use crate::status::Status;
 
 /// A field for the forces of all legs and one for the multipliers.
@@ -52,65 +52,142 @@ pub fn inverse_dynamics_derivatives(
         ("constraint_by_geometry", vec![multipliers, geometry.len()]),
         ("lengths_by_geometry", vec![forces, geometry.len()]),
     ];
-    let ids: [FieldId; 17] = block::fields();
-    let pair = |k: usize| [ids[2 * k], ids[2 * k + 1]];
-    let lengths = ids[16];
-    let varied = geometry.iter().map(|parameter| geometry::varied(mech, parameter));
-    let varied: Option<Vec<_>> = varied.map(|v| Some((set.varied(&v)?, v))).collect();
-    let answer = |rows: &mut Rows<'_, 17>, regressor: &mut Regressor, i: usize| {
-        let (platform, _, mut status) = solvable(mech, states, loads, i);
-        if status != Status::Ok {
-            return status;
-        }
-        let (wrench, axes) = loads.given::<f64>(mech, At::one(i));
-        let wrench = Wrench::new(Vec3::lift(wrench.force), Vec3::lift(wrench.torque));
-        let load = |pose: &Pose<Dual<f64>>| dynamics::load_in_base(wrench, axes, pose);
-        for (k, part) in Part::ALL.into_iter().enumerate() {
-            put(mech, rows, pair(k), i, &derivatives::by_motion(mech, &platform, &load, part));
-        }
-        let columns = regressor.columns(&platform);
-        put(mech, rows, pair(6), i, &regressor.by_bodies(mech, &columns));
-        status = limit_status(mech, &platform.pose);
-        match derivatives::by_coordinates(mech, &platform, &load, set, &given) {
-            None => status = Status::Fold,
-            Some(parts) => {
-                for (k, columns) in parts.iter().enumerate() {
-                    put(mech, rows, pair(3 + k), i, columns);
-                }
-            }
-        }
-        let q = coordinates::along(mech, set, &platform);
-        let by = |(set, v): &(_, _)| derivatives::by_geometry(v, &q, &load, set, &given);
-        match varied.as_ref().and_then(|all| all.iter().map(by).collect::<Option<Vec<_>>>()) {
-            None => status = Status::Fold,
-            Some(columns) => {
-                let forces: Vec<_> = columns.iter().map(|c| c.forces).collect();
-                put(mech, rows, pair(7), i, &forces);
-                for leg in 0..mech.legs.len() {
-                    let row: Vec<f64> = columns.iter().map(|c| c.lengths[leg]).collect();
-                    rows.set(lengths, i, leg, &row);
-                }
-            }
-        }
-        status
+    let varied = geometry.iter().map(|parameter| Varied::new(geometry::varied(mech, parameter), set));
+    let operation = Derivatives {
+        mech,
+        states,
+        loads,
+        set,
+        given: &given,
+        numbers: (0..set.names().len()).filter(|&k| given[k]).collect(),
+        varied: varied.collect::<Option<Vec<_>>>(),
+        parameters: geometry.len(),
+        regressor: Regressor::new(mech),
     };
-    in_pieces(mech, states.len(), fields, answer)
+    block::table(&operation, states.len(), fields)
 }
 
-/// The same as [`block::one_by_one`] with a regressor for each piece of the states.
-fn in_pieces<const N: usize>(
-    mech: &Mechanism,
-    states: usize,
-    fields: [(&'static str, Vec<usize>); N],
-    answer: impl Fn(&mut Rows<'_, N>, &mut Regressor, usize) -> Status + Sync,
-) -> Table {
-    block::in_pieces(states, fields, Pieces::SLOW, |rows, piece| {
-        let mut regressor = Regressor::new(mech);
-        for i in piece {
-            let status = answer(rows, &mut regressor, i);
-            rows.set_status(i, status);
+struct Derivatives<'a> {
+    mech: &'a Mechanism,
+    states: &'a States<'a>,
+    loads: &'a Loads<'a>,
+    set: &'a Set,
+    given: &'a [bool; MAX_COORDINATES],
+    /// Numbers of the given coordinates.
+    numbers: Vec<usize>,
+    /// The mechanism as it varies with each number of the geometry; none if the set is none of it then.
+    varied: Option<Vec<Varied>>,
+    parameters: usize,
+    regressor: Regressor,
+}
+
+/// Columns of a block of states, and the legs' states and lengths.
+struct Room<V> {
+    legs: Vec<leg::State<V>>,
+    columns: Vec<Column<V>>,
+    lengths: Vec<V>,
+}
+
+impl Working<17> for Derivatives<'_> {
+    type Room<V: Lanes> = Room<V>;
+
+    fn room<V: Lanes>(&self) -> Room<V> {
+        Room {
+            legs: Vec::with_capacity(self.mech.legs.len()),
+            columns: vec![[V::zero(); 6]; self.regressor.parameters.len()],
+            lengths: vec![V::zero(); self.mech.legs.len()],
         }
-    })
+    }
+
+    #[inline(always)]
+    fn run<V: Lanes>(&self, room: &mut Room<V>, at: At, answers: &mut Answers<'_, 17>) -> Codes<V> {
+        let (mech, ids) = (self.mech, Answers::<17>::fields());
+        let (state, codes) = solve(mech, self.states, self.loads, at);
+        let by_motion = derivatives::by_motion(mech, &state);
+        for k in 0..DIRECTIONS {
+            put(mech, answers, pair(&ids, k / 6), 6, k % 6, &by_motion[k]);
+        }
+        self.put_by_bodies(room, &state, pair(&ids, 6), answers);
+
+        let q = coordinates::along(mech, self.set, &state.platform);
+        let determined = coordinates::determined(mech, self.set, &q, self.given);
+        let determined = determined.greater(V::lit(DEPENDENT_PIVOTS));
+        let (given, mut sum) = (Given { q, given: self.given }, V::zero());
+        for order in 0..3 {
+            for (k, &number) in self.numbers.iter().enumerate() {
+                let column = derivatives::by_coordinate(mech, self.set, &by_motion, &given, number, order);
+                sum = add(sum, &column);
+                put(mech, answers, pair(&ids, 3 + order), self.numbers.len(), k, &column);
+            }
+        }
+        let codes = keep(answers, &ids[6..12], determined, sum, codes);
+
+        let mut sum = V::zero();
+        for k in 0..self.parameters {
+            let column = match &self.varied {
+                Some(varied) => {
+                    derivatives::by_geometry(&varied[k], &state, &by_motion, &given, &mut room.lengths)
+                }
+                None => [V::lit(f64::NAN); 6],
+            };
+            sum = add(add(sum, &column), &room.lengths);
+            put(mech, answers, pair(&ids, 7), self.parameters, k, &column);
+            for leg in 0..mech.legs.len() {
+                answers.put(ids[16], leg * self.parameters + k, [room.lengths[leg]]);
+            }
+        }
+        let codes = keep(answers, &ids[14..17], determined, sum, codes);
+        within_limits(mech, &state.platform.pose, codes)
+    }
+}
+
+/// Leaves numbers only where the coordinates determine the motion, and all are finite, as their `sum` then is.
+#[inline(always)]
+fn keep<V: Lanes>(
+    answers: &mut Answers<'_, 17>,
+    fields: &[FieldId],
+    determined: V::Mask,
+    sum: V,
+    codes: Codes<V>,
+) -> Codes<V> {
+    let known = V::select(determined, sum, V::lit(f64::NAN)).at_most(V::zero());
+    for &field in fields {
+        answers.keep::<V>(field, known);
+    }
+    codes.but(known, Status::Fold)
+}
+
+impl Derivatives<'_> {
+    #[inline(always)]
+    fn put_by_bodies<V: Lanes>(
+        &self,
+        room: &mut Room<V>,
+        state: &Solved<V>,
+        fields: Pair,
+        answers: &mut Answers<'_, 17>,
+    ) {
+        let (mech, count) = (self.mech, room.columns.len());
+        set_legs(mech, state, &mut room.legs);
+        for k in 0..count {
+            room.columns[k] = self.regressor.column(mech, &state.platform, &room.legs, &state.answering, k);
+        }
+        for k in 0..count {
+            put(mech, answers, fields, count, k, &self.regressor.by_bodies(&room.columns, k));
+        }
+    }
+}
+
+/// Adds nothing to a sum if the numbers are all finite, else NaN.
+#[inline(always)]
+fn add<V: Lanes>(mut sum: V, numbers: &[V]) -> V {
+    for x in numbers {
+        sum = sum + *x * V::zero();
+    }
+    sum
+}
+
+fn pair(ids: &[FieldId; 17], k: usize) -> Pair {
+    [ids[2 * k], ids[2 * k + 1]]
 }
 
 /// The coefficients of the inertial parameters in active forces and multipliers, and what load and damping add
@@ -125,49 +202,76 @@ pub fn regressors(mech: &Mechanism, states: &States, loads: &Loads) -> Table {
         ("forces_offset", vec![forces]),
         ("constraint_offset", vec![multipliers]),
     ];
-    let [y, y_constraint, offset, offset_constraint] = block::fields();
-    in_pieces(mech, states.len(), fields, |rows, regressor, i| {
-        let (platform, load, status) = solvable(mech, states, loads, i);
-        if status != Status::Ok {
-            return status;
+    let operation = Regressors { mech, states, loads, regressor: Regressor::new(mech) };
+    block::table(&operation, states.len(), fields)
+}
+
+struct Regressors<'a> {
+    mech: &'a Mechanism,
+    states: &'a States<'a>,
+    loads: &'a Loads<'a>,
+    regressor: Regressor,
+}
+
+impl Working<4> for Regressors<'_> {
+    type Room<V: Lanes> = Vec<leg::State<V>>;
+
+    fn room<V: Lanes>(&self) -> Vec<leg::State<V>> {
+        Vec::with_capacity(self.mech.legs.len())
+    }
+
+    #[inline(always)]
+    fn run<V: Lanes>(&self, legs: &mut Vec<leg::State<V>>, at: At, answers: &mut Answers<'_, 4>) -> Codes<V> {
+        let (mech, [y, y_constraint, offset, offset_constraint]) = (self.mech, Answers::fields());
+        let (state, codes) = solve(mech, self.states, self.loads, at);
+        set_legs(mech, &state, legs);
+        let (platform, answering) = (&state.platform, &state.answering);
+        let width = self.regressor.parameters.len();
+        for k in 0..width {
+            let column = self.regressor.column(mech, platform, legs, answering, k);
+            put(mech, answers, [y, y_constraint], width, k, &column);
         }
-        put(mech, rows, [y, y_constraint], i, &regressor.columns(&platform));
-        put(mech, rows, [offset, offset_constraint], i, &[regressor.offset(&platform, load)]);
-        limit_status(mech, &platform.pose)
-    })
+        let load = self.loads.of(mech, &platform.pose, at);
+        let rest = Regressor::offset(mech, &platform.twist, load, answering);
+        put(mech, answers, [offset, offset_constraint], 1, 0, &rest);
+        within_limits(mech, &platform.pose, codes)
+    }
 }
 
-/// A state, and whether inverse dynamics has an answer there.
-fn solvable(
-    mech: &Mechanism,
-    states: &States,
-    loads: &Loads,
-    i: usize,
-) -> (Motion<f64>, Wrench<f64>, Status) {
-    let (platform, load, status) = states.one(mech, loads, i);
-    let status = then(status, || {
-        let (forces, pivots) = dynamics::inverse_dynamics(mech, &platform, load);
-        outcome(mech, &forces, pivots)
-    });
-    (platform, load, status)
+/// Inverse dynamics at the states, and whether it has an answer there.
+#[inline(always)]
+fn solve<V: Lanes>(mech: &Mechanism, states: &States, loads: &Loads, at: At) -> (Solved<V>, Codes<V>) {
+    let (platform, load, codes) = states.loaded_at(mech, loads, at);
+    let answering = Answering::at(mech, &platform.pose);
+    let forces = answering.to(resultant(mech, &platform, load));
+    let codes = solved(mech, &forces, answering.pivots, codes);
+    (Solved { platform, load: loads.given(mech, at), forces, answering }, codes)
 }
 
-/// Columns for active forces and multipliers, written as rows for all legs (zero for passive ones) and multipliers.
-fn put<const N: usize>(
+#[inline(always)]
+fn set_legs<V: Lanes>(mech: &Mechanism, state: &Solved<V>, legs: &mut Vec<leg::State<V>>) {
+    legs.clear();
+    for leg in &mech.legs {
+        legs.push(leg::state(leg, &state.platform));
+    }
+}
+
+/// One of `width` columns for active forces and multipliers, of rows for all legs (zero for passive ones) and multipliers.
+#[inline(always)]
+fn put<V: Lanes, const N: usize>(
     mech: &Mechanism,
-    rows: &mut Rows<'_, N>,
+    answers: &mut Answers<'_, N>,
     [forces, multipliers]: Pair,
-    state: usize,
-    columns: &[[f64; 6]],
+    width: usize,
+    k: usize,
+    column: &Column<V>,
 ) {
-    let row = |k: usize| -> Vec<f64> { columns.iter().map(|column| column[k]).collect() };
-    for k in 0..mech.legs.len() {
-        rows.set(forces, state, k, &vec![0.0; columns.len()]);
+    let mut row = 0;
+    for (i, leg) in mech.legs.iter().enumerate() {
+        answers.put(forces, i * width + k, [if leg.actuated { column[row] } else { V::zero() }]);
+        row += usize::from(leg.actuated);
     }
-    for (place, (k, _)) in mech.actuated().enumerate() {
-        rows.set(forces, state, k, &row(place));
-    }
-    for k in 0..mech.independent.len() {
-        rows.set(multipliers, state, k, &row(mech.dof() + k));
+    for i in 0..mech.independent.len() {
+        answers.put(multipliers, i * width + k, [column[mech.dof() + i]]);
     }
 }

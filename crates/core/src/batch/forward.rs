@@ -1,12 +1,12 @@
 //! Forward kinematics of many states.
 
 use super::Table;
-use super::block::{self, Pieces, Rows};
-use super::checks::{actuated_values, check_legs, is_rotation, joint_limits, raw_pose, then};
+use super::block::{self, Codes, Pieces, Rows};
+use super::checks::{actuated_values, is_rotation, joint_limits, raw_pose, then, with_legs};
 use crate::forward::{self, Found};
-use crate::forward_lanes::forward_kinematics_of;
-use crate::lanes::WIDTH;
-use crate::limits;
+use crate::forward_lanes::{Poses, forward_kinematics_of, load, put};
+use crate::lanes::{self, Lanes, Row, Task, WIDTH};
+use crate::limits::Seen;
 use crate::mechanism::Mechanism;
 use crate::modes::{self, Start};
 use crate::spatial::Pose;
@@ -34,16 +34,23 @@ pub fn forward_kinematics(
     let asked = |i: usize| actuated_values(mech, lengths, i);
     if !continued {
         return block::in_pieces(n, fields, IN_LANES, |rows, piece| {
-            let valid = |i: usize| {
-                let guess = guess(i);
-                rows.set_status(i, Status::InvalidInput);
-                Some((i, guess?))
-            };
-            let states: Vec<(usize, Pose<f64>)> = piece.filter_map(valid).collect();
-            for states in states.chunks(WIDTH) {
-                let asked: Vec<_> = states.iter().map(|&(i, guess)| (asked(i), guess)).collect();
-                for (&(i, _), found) in states.iter().zip(forward_kinematics_of(mech, &asked)) {
-                    put_found(mech, rows, i, &found);
+            let (mut states, mut numbers) = (Vec::with_capacity(WIDTH), Vec::with_capacity(WIDTH));
+            let last = piece.end;
+            for i in piece {
+                match guess(i) {
+                    None => rows.set_status(i, Status::InvalidInput),
+                    Some(guess) => {
+                        states.push((asked(i), guess));
+                        numbers.push(i);
+                    }
+                }
+                if states.len() == WIDTH || i + 1 == last {
+                    let found = forward_kinematics_of(mech, &states);
+                    let checked = checks(mech, found.iter().map(|f| (&f.pose, f.residual)));
+                    for ((i, found), check) in numbers.drain(..).zip(&found).zip(checked) {
+                        put_found(rows, i, found, then(found.status, || block::read(check).0));
+                    }
+                    states.clear();
                 }
             }
         });
@@ -61,7 +68,8 @@ pub fn forward_kinematics(
             if let (Some(last), Some(before), Status::Ok) = (last, before, found.status) {
                 found = forward::passed(mech, &values, &before, &last, &found).unwrap_or(found);
             }
-            let status = put_found(mech, rows, i, &found);
+            let status = then(found.status, || check_found(mech, &found.pose, found.residual));
+            put_found(rows, i, &found, status);
             let unsolved = [Status::NotConverged, Status::InvalidInput, Status::Singular, Status::ModeJump]
                 .contains(&status);
             (last, before) =
@@ -75,9 +83,8 @@ pub fn forward_kinematics(
 const IN_LANES: Pieces = Pieces { least: 32, unit: WIDTH };
 
 /// Writes down what was found, with its status.
-fn put_found(mech: &Mechanism, rows: &mut Rows<'_, 3>, i: usize, found: &Found) -> Status {
+fn put_found(rows: &mut Rows<'_, 3>, i: usize, found: &Found, status: Status) {
     let Found { pose, residual, iterations, .. } = *found;
-    let status = then(found.status, || check_found(mech, &pose, residual));
     let [poses, residuals, counts] = block::fields();
     rows.set_status(i, status);
     if !matches!(status, Status::NotConverged | Status::InvalidInput) {
@@ -85,19 +92,53 @@ fn put_found(mech: &Mechanism, rows: &mut Rows<'_, 3>, i: usize, found: &Found) 
         rows.set(residuals, i, 0, &[residual]);
     }
     rows.set(counts, i, 0, &[f64::from(iterations)]);
-    status
 }
 
-/// Whether a pose that was found is one that the mechanism can be in, and within its limits. A root that a constraint
-/// has only because a leg has no frame there is none. Strokes are judged by the lengths that were asked for, which the
-/// pose's own miss by the residual: lengths at the very end of a stroke are within it.
+/// Whether a pose that was found is one that the mechanism can be in, and within its limits.
 fn check_found(mech: &Mechanism, pose: &Pose<f64>, residual: f64) -> Status {
-    then(check_legs(mech, pose), || {
-        limits::status(joint_limits(mech).map(|limit| {
-            let missed = if limit.status() == Status::OutOfStroke { residual } else { 0.0 };
-            (limit, limit.margin(mech, pose, None) + missed)
-        }))
-    })
+    block::read(checks(mech, [(pose, residual)])[0]).0
+}
+
+/// The same of at most [`WIDTH`] poses with their residuals, as codes.
+fn checks<'a>(mech: &Mechanism, found: impl IntoIterator<Item = (&'a Pose<f64>, f64)>) -> Row {
+    let (mut poses, mut residuals, mut codes) = ([[0.0; WIDTH]; 12], [0.0; WIDTH], [0.0; WIDTH]);
+    for (k, (pose, residual)) in found.into_iter().enumerate() {
+        put(&mut poses, k, pose);
+        residuals[k] = residual;
+    }
+    lanes::dispatch(Checks { mech, poses: &poses, residuals: &residuals, codes: &mut codes });
+    codes
+}
+
+struct Checks<'a> {
+    mech: &'a Mechanism,
+    poses: &'a Poses,
+    residuals: &'a Row,
+    codes: &'a mut Row,
+}
+
+impl Task for Checks<'_> {
+    /// A root that a constraint has only because a leg has no frame there is none. Strokes are judged by the lengths
+    /// that were asked for, which the pose's own miss by the residual: lengths at the very end of a stroke are within
+    /// it.
+    #[inline(always)]
+    fn run<V: Lanes>(self) {
+        let (mech, mut k) = (self.mech, 0);
+        while k < WIDTH {
+            let (pose, residual) = (load::<V>(self.poses, k), V::load(&self.residuals[k..]));
+            let mut codes = with_legs(mech, &pose, Codes::ok());
+            let mut seen = Seen::default();
+            for limit in joint_limits(mech) {
+                let mut margin = limit.bound.margin(limit.of_joint(mech, &pose, &mut seen));
+                if limit.status() == Status::OutOfStroke {
+                    margin = margin + residual;
+                }
+                codes = codes.unless(V::zero().at_most(margin), limit.status());
+            }
+            codes.store(&mut self.codes[k..]);
+            k += V::WIDTH;
+        }
+    }
 }
 
 /// All assembly modes of each set of lengths, one after the other, and how many belong to each set \[T28\].

@@ -1,12 +1,13 @@
 //! Joint reactions at many states.
 
-use super::block::{self, Pieces};
-use super::checks::limit_status;
+use super::block::{self, Answers, At, Codes, Working};
+use super::checks::within_limits;
 use super::dynamics::Loads;
-use super::{FieldId, States, Table};
+use super::{States, Table};
+use crate::lanes::Lanes;
 use crate::mechanism::Mechanism;
-use crate::reactions;
-use crate::spatial::Wrench;
+use crate::reactions::{self, Joint};
+use crate::self_stress::Solver;
 use crate::status::Status;
 
 /// Reactions of all joints on the links on their platform's side, each at its joint's point \[T44\]-\[T48\], in the order of
@@ -15,7 +16,7 @@ use crate::status::Status;
 #[must_use]
 pub fn joint_reactions(mech: &Mechanism, states: &States, loads: &Loads, scale: f64) -> Table {
     let joints = reactions::joints(mech);
-    let (n, width) = (states.len(), joints.len());
+    let width = joints.len();
     let six = || vec![width, 6];
     let fields = [
         ("points", vec![width, 3]),
@@ -28,28 +29,45 @@ pub fn joint_reactions(mech: &Mechanism, states: &States, loads: &Loads, scale: 
         ("determinate_in_joint", six()),
         ("constraint_wrench", vec![6]),
     ];
-    let ids: [FieldId; 9] = block::fields();
-    let flags = |marks: &[bool; 6]| marks.map(|mark| f64::from(u8::from(mark)));
-    block::one_by_one(n, fields, Pieces::SLOW, |rows, i| {
-        let (platform, load, status) = states.one(mech, loads, i);
-        if status != Status::Ok {
-            return status;
+    let operation = JointReactions { mech, joints: &joints, states, loads, scale };
+    block::table(&operation, states.len(), fields)
+}
+
+struct JointReactions<'a> {
+    mech: &'a Mechanism,
+    joints: &'a [Joint],
+    states: &'a States<'a>,
+    loads: &'a Loads<'a>,
+    scale: f64,
+}
+
+impl<'a> Working<9> for JointReactions<'a> {
+    type Room<V: Lanes> = Solver<'a, V>;
+
+    fn room<V: Lanes>(&self) -> Solver<'a, V> {
+        Solver::new(self.mech, self.joints, self.scale)
+    }
+
+    #[inline(always)]
+    fn run<V: Lanes>(&self, room: &mut Solver<'a, V>, at: At, answers: &mut Answers<'_, 9>) -> Codes<V> {
+        let (mech, ids) = (self.mech, Answers::<9>::fields());
+        let (platform, load, codes) = self.states.loaded_at(mech, self.loads, at);
+        let codes = codes.unless(room.solve(&platform, load), Status::Singular);
+        for j in 0..self.joints.len() {
+            let (place, assumed, least) = (&room.places[j], room.assumed[j], room.least[j]);
+            let axes = place.axes.transpose().0;
+            answers.put(ids[0], j, place.point.array());
+            for k in 0..3 {
+                answers.put(ids[1], 3 * j + k, axes[k].array());
+            }
+            answers.put(ids[2], j, assumed.array());
+            answers.put(ids[3], j, place.seen(assumed).array());
+            answers.put(ids[4], j, least.array());
+            answers.put(ids[5], j, place.seen(least).array());
+            answers.put(ids[6], j, room.determinate[j]);
+            answers.put(ids[7], j, room.determinate_in_joint[j]);
         }
-        let Some(found) = reactions::solve(mech, &joints, &platform, load, scale) else {
-            return Status::Singular;
-        };
-        for (j, place) in found.places.iter().enumerate() {
-            let seen = |w: Wrench<f64>| place.seen(w).array();
-            rows.set(ids[0], i, j, &place.point.array());
-            rows.set(ids[1], i, j, place.axes.rows().as_flattened());
-            rows.set(ids[2], i, j, &found.assumed[j].array());
-            rows.set(ids[3], i, j, &seen(found.assumed[j]));
-            rows.set(ids[4], i, j, &found.least[j].array());
-            rows.set(ids[5], i, j, &seen(found.least[j]));
-            rows.set(ids[6], i, j, &flags(&found.determinate[j]));
-            rows.set(ids[7], i, j, &flags(&found.determinate_in_joint[j]));
-        }
-        rows.set(ids[8], i, 0, &found.constraint.array());
-        limit_status(mech, &platform.pose)
-    })
+        answers.put(ids[8], 0, room.constraint.array());
+        within_limits(mech, &platform.pose, codes)
+    }
 }

@@ -1,0 +1,35 @@
+"""Kinds of singularities."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+
+from polypod import _core
+
+
+class SingularityKind(IntEnum):
+    """What is singular about a pose: the first of these conditions that holds [T32]."""
+
+    UNKNOWN = -1
+    """There is no answer: `status` says why."""
+    NONE = 0
+    LEG_LENGTH = 1
+    """A leg has no length: an inverse singularity, the paper's fourth."""
+    CONSTRAINT_VANISHES = 2
+    """The wrench of a constraint vanishes, as where L ∥ l and r ∥ L: the paper's first."""
+    CONSTRAINT = 3
+    """The constraint wrenches depend on one another: a freedom more, that no actuator controls."""
+    LEG_FRAME = 4
+    """A leg lies along the axis of its universal joint or rod: its turning about itself is undetermined."""
+    ACTUATION = 5
+    """With all actuators locked the platform can still move: a direct singularity."""
+    DEPENDENT_ROWS = 6
+    """Only the constraints that J holds depend on one another: J is singular, the mechanism is not."""
+
+    @property
+    def message(self) -> str:
+        """What it means."""
+        return _MESSAGES.get(self, "no answer; the status says why")
+
+
+_MESSAGES = {code: message for code, _, message in _core.singularity_kinds()}
