@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 import polypod as pp
+from polypod.multibody.placement import BASE, PLATFORM, inverse
+from polypod.multibody.tree import depth_first, describe, joint_values, release
 from polypod.verify import table, verify, verify_states
-from polypod.verify.placement import BASE, PLATFORM, inverse
 from polypod.verify.report import as_markdown
-from polypod.verify.tree import depth_first, describe, joint_values, release
 
 pin = pytest.importorskip("pinocchio")
 

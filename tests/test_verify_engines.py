@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 
 import polypod as pp
+from polypod.multibody.placement import PLATFORM, turned
+from polypod.multibody.tree import describe
 from polypod.verify import integrate, table, verify_states
-from polypod.verify.placement import PLATFORM, turned
 from polypod.verify.rows import Links, Square, jacobian, redundant, residual, rows_of
-from polypod.verify.tree import describe
 
 pytest.importorskip("exudyn")
 pytest.importorskip("mujoco")

@@ -452,6 +452,31 @@ def test_meshes_load_back(reachable, tmp_path):
     assert stl.volume == pytest.approx(reachable.volume, rel=1e-6)
 
 
+def test_scenes_load_back(reachable, tmp_path):
+    reachable.save(tmp_path / "w.glb")
+    scene = trimesh.load(tmp_path / "w.glb", force="scene")
+    (name,) = scene.geometry
+    assert name.startswith(f"workspace of {reachable.mechanism.name}")
+    placed, _ = scene.graph.get(f"workspace of {reachable.mechanism.name}")
+    assert np.array_equal(placed[:3, :3] @ [1, 2, 3], [1, 3, -2])  # z is up in a workspace, y in a scene
+    mesh = scene.geometry[name]
+    assert np.abs(mesh.vertices[mesh.faces] - reachable.vertices[reachable.faces]).max() < 1e-6
+    part = np.array([[int(c[i : i + 2], 16) for i in (1, 3, 5)] for c in reachable.colors]) / 255.0
+    light = np.where(part <= 0.04045, part / 12.92, ((part + 0.055) / 1.055) ** 2.4)
+    colors = mesh.visual.vertex_colors[mesh.faces][..., :3] / 255.0
+    assert np.abs(colors - light[reachable.labels][reachable.faces]).max() <= 0.501 / 255.0
+    assert mesh.is_watertight
+    assert mesh.volume == pytest.approx(reachable.volume, rel=1e-6)
+
+
+def test_scenes_are_for_positions(tmp_path):
+    from polypod.workspace import check_suffix
+
+    check_suffix(tmp_path / "w.glb", ["x", "y", "z"])
+    with pytest.raises(pp.WorkspaceError, match="not z, alpha, beta"):
+        check_suffix(tmp_path / "w.glb", ["z", "alpha", "beta"])
+
+
 def test_the_mesh_is_closed_and_has_the_volume(reachable, upright, aspect):
     for found in (reachable, upright, aspect):
         mesh = found.mesh()
@@ -465,7 +490,7 @@ def test_the_mesh_is_closed_and_has_the_volume(reachable, upright, aspect):
 
 @pytest.mark.parametrize("name", ["w.obj", "w"])
 def test_other_files_are_refused(reachable, tmp_path, name):
-    with pytest.raises(pp.WorkspaceError, match=r"\.stl, \.ply, \.nc"):
+    with pytest.raises(pp.WorkspaceError, match=r"\.stl, \.ply, \.nc, \.glb"):
         reachable.save(tmp_path / name)
 
 

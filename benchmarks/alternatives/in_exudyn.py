@@ -8,9 +8,9 @@ widths of its differences, because one does not give the same answer [T63].
 import exudyn
 import numpy as np
 
+from polypod.multibody.placement import PLATFORM
+from polypod.multibody.tree import describe
 from polypod.verify.exudyn import System, Twin
-from polypod.verify.placement import PLATFORM
-from polypod.verify.tree import describe
 
 
 class Exudyn:

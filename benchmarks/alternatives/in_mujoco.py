@@ -9,9 +9,9 @@ platform's acceleration stays the same [T64].
 import mujoco
 import numpy as np
 
+from polypod.multibody.placement import PLATFORM
+from polypod.multibody.tree import describe
 from polypod.verify.mujoco import Twin
-from polypod.verify.placement import PLATFORM
-from polypod.verify.tree import describe
 
 SETTLED = 1e-7
 """Largest change of the platform's acceleration from pass to pass, as a part of it and of gravity."""

@@ -12,6 +12,7 @@ from polypod import compute, errors
 from polypod._core import __version__
 from polypod.errors import (
     CoordinateError,
+    ExportError,
     LengthsError,
     MechanismError,
     MissingEngineError,
@@ -52,6 +53,7 @@ _LATER = {
 __all__ = [
     "ComputedTorque",
     "CoordinateError",
+    "ExportError",
     "LengthsError",
     "Mechanism",
     "MechanismError",

@@ -65,6 +65,10 @@ class WorkspaceError(PolypodError):
     """A workspace that cannot be made, read or written."""
 
 
+class ExportError(PolypodError):
+    """A file in another tool's format that cannot be made."""
+
+
 class CoordinateError(PolypodError):
     """Coordinates that make up no coordinate set of the mechanism."""
 

@@ -75,7 +75,7 @@ class Solution:
         if write is None:
             raise SolutionError(_unknown_suffix(path))
         try:
-            with _replacing(path) as temporary:
+            with replacing(path) as temporary:
                 write(self.dataset, temporary)
         except OSError as error:
             raise SolutionError(f"{path} cannot be written: {error.strerror or error}") from error
@@ -100,7 +100,7 @@ def _unknown_suffix(path: Path) -> str:
 
 
 @contextmanager
-def _replacing(path: Path) -> Iterator[Path]:
+def replacing(path: Path) -> Iterator[Path]:
     """A path beside `path` to write to, which takes its place once all is written."""
     temporary = path.with_name(f".{path.name}.{os.getpid()}")
     try:

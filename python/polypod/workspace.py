@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from os import PathLike
@@ -18,7 +19,7 @@ from polypod.boundary import Cuts, content_with_error, surface
 from polypod.errors import WorkspaceError
 from polypod.mechanism import Mechanism
 from polypod.regions import Grid
-from polypod.results import _replacing
+from polypod.results import replacing
 from polypod.style import GREY, INK, PALE, YELLOW, color_of
 from polypod.units import coordinate_unit
 
@@ -34,7 +35,7 @@ SINGULARITY, EDGE_OF_GRID, NO_POSE = "singularity", "edge of grid", "no pose"
 Beyond, the sign of det J changes; the grid ends; no pose was found.
 """
 
-SUFFIXES = (".stl", ".ply", ".nc")
+SUFFIXES = (".stl", ".ply", ".nc", ".glb")
 """Of files that a workspace is saved to."""
 
 _FORMAT = "polypod workspace 1"
@@ -169,22 +170,36 @@ class Workspace:
         return of_workspace(self)
 
     def save(self, path: str | PathLike[str]) -> None:
-        """Writes the boundary (`.stl`, `.ply`) or everything (`.nc`); meshes are in m and rad.
+        """Writes the boundary (`.stl`, `.ply`, `.glb`) or everything (`.nc`); meshes are in m and rad.
 
         STL holds single precision and no labels. PLY holds double precision, the label of each vertex as a
-        number and a colour, and the labels' names as comments.
+        number and a colour, and the labels' names as comments. GLB holds single precision and the colours,
+        and is for positions: y is up in it, see `polypod.export.gltf`.
 
-        Raises WorkspaceError for another suffix, and for a mesh of two coordinates.
+        Raises WorkspaceError for another suffix, for a mesh of two coordinates, and for GLB of angles.
         """
         path = Path(path)
-        check_suffix(path, len(self.names))
-        with _replacing(path) as temporary:
+        check_suffix(path, self.names)
+        with replacing(path) as temporary:
             if path.suffix == ".nc":
                 self.to_xarray().assign_attrs(polypod_format=_FORMAT).to_netcdf(temporary, engine="scipy")
             elif path.suffix == ".stl":
                 self.mesh().export(temporary, file_type="stl")
+            elif path.suffix == ".glb":
+                temporary.write_bytes(self._glb())
             else:
                 temporary.write_bytes(self._ply())
+
+    def _glb(self) -> bytes:
+        """A GLB scene of the boundary in the labels' colours."""
+        from polypod.export.gltf import mesh_glb
+
+        return mesh_glb(self.mesh(), self._rgb[self.labels], f"workspace of {self.mechanism.name}")
+
+    @property
+    def _rgb(self) -> np.ndarray[Any, np.dtype[np.uint8]]:
+        """(labels, 3): the colours from 0 to 255."""
+        return np.array([[int(c[i : i + 2], 16) for i in (1, 3, 5)] for c in self.colors], np.uint8)
 
     def _ply(self) -> bytes:
         """A binary PLY file."""
@@ -199,8 +214,7 @@ class Workspace:
         vertex = np.dtype([("at", "<f8", 3), ("color", "u1", 3), ("label", "<i4")])
         points = np.empty(len(self.vertices), vertex)
         points["at"], points["label"] = self.vertices, self.labels
-        rgb = np.array([[int(c[i : i + 2], 16) for i in (1, 3, 5)] for c in self.colors], np.uint8)
-        points["color"] = rgb[self.labels]
+        points["color"] = self._rgb[self.labels]
         triangles = np.empty(len(self.faces), np.dtype([("n", "u1"), ("of", "<i4", 3)]))
         triangles["n"], triangles["of"] = 3, self.faces
         return header.encode() + points.tobytes() + triangles.tobytes()
@@ -227,14 +241,18 @@ def _mixed(color: str, other: str, share: float) -> str:
     return "#" + "".join(f"{round((1 - share) * a + share * b):02X}" for a, b in zip(*parts, strict=True))
 
 
-def check_suffix(path: Path, coordinates: int) -> None:
-    """Raises WorkspaceError where a workspace cannot be saved to such a file."""
+def check_suffix(path: Path, names: Sequence[str]) -> None:
+    """Raises WorkspaceError where a workspace over these coordinates cannot be saved to such a file."""
     if path.suffix not in SUFFIXES:
         raise WorkspaceError(
             f"{path} ends in {path.suffix!r}; a workspace's file ends in {', '.join(SUFFIXES)}"
         )
-    if coordinates != 3 and path.suffix != ".nc":
-        raise WorkspaceError(f"{path}: a workspace of {coordinates} coordinates has no mesh; save it as .nc")
+    if len(names) != 3 and path.suffix != ".nc":
+        raise WorkspaceError(f"{path}: a workspace of {len(names)} coordinates has no mesh; save it as .nc")
+    if path.suffix == ".glb" and tuple(names) != ("x", "y", "z"):
+        raise WorkspaceError(
+            f"{path}: a scene holds positions x, y, z, not {', '.join(names)}; save it as .stl or .ply"
+        )
 
 
 def load_workspace(path: str | PathLike[str]) -> Workspace:

@@ -21,6 +21,7 @@ COMMANDS = (
     "workspace",
     "verify",
     "view",
+    "export",
 )
 
 app = typer.Typer(

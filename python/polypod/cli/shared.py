@@ -6,13 +6,16 @@ import json
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 from rich.text import Text
+
+if TYPE_CHECKING:
+    from polypod.mechanism import Mechanism
 
 MechanismArgument = Annotated[
     str, typer.Argument(metavar="MECHANISM", help="A mechanism file (.toml) or a built-in mechanism's name.")
@@ -47,6 +50,18 @@ def check_result_path(path: Path, *inputs: str, suffixes: tuple[str, ...] = RESU
         raise SolutionError(
             f"{path.parent} is no directory; make it first, or choose another place for the result"
         )
+
+
+def pose_at(mech: Mechanism, coordinates: dict[str, float], branch: int) -> Any:
+    """The pose with the coordinates of `--at`; wrong input where there is none."""
+    from polypod.errors import PolypodError
+    from polypod.status import Status
+
+    state = mech.state(coordinates, branch=branch)
+    status = Status(int(state.status))
+    if not status.has_answer:
+        raise PolypodError(f"--at: {status.message}")
+    return state.pose
 
 
 # --- printing -----------------------------------------------------------------------------------------------

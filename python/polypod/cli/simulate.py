@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.markup import escape
@@ -13,15 +13,15 @@ from polypod.cli.shared import (
     ResultOption,
     check_result_path,
     console,
+    pose_at,
     print_json,
     print_written,
     progress_bar,
 )
 from polypod.cli.solve import print_solution
-from polypod.errors import PolypodError
 
 if TYPE_CHECKING:
-    from polypod.mechanism import Mechanism
+    pass
 
 app = typer.Typer()
 
@@ -79,7 +79,7 @@ def simulate(
     if motion is not None and not at:
         coordinates = {name: float(values[0]) for name, values in motion.coordinates.items()}
         branch = motion.branch
-    pose = mech.home if not coordinates else _pose_at(mech, coordinates, branch)
+    pose = mech.home if not coordinates else pose_at(mech, coordinates, branch)
     with progress_bar("simulating", 1) as progress:
         solution = mech.simulate(
             pose,
@@ -100,14 +100,3 @@ def simulate(
         print_written(result)
     if end["kind"] == "no answer":
         raise typer.Exit(1)
-
-
-def _pose_at(mech: Mechanism, coordinates: dict[str, float], branch: int) -> Any:
-    """The pose with these coordinates; wrong input where there is none."""
-    from polypod.status import Status
-
-    state = mech.state(coordinates, branch=branch)
-    status = Status(int(state.status))
-    if not status.has_answer:
-        raise PolypodError(f"--at: {status.message}")
-    return state.pose

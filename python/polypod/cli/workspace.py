@@ -75,7 +75,9 @@ def workspace(
     threads: Annotated[int, typer.Option(metavar="N", help="Threads; 0 for those of batches.")] = 0,
     output: Annotated[
         Path | None,
-        typer.Option("-o", "--output", metavar="FILE", help="Save the boundary (.stl, .ply) or all (.nc)."),
+        typer.Option(
+            "-o", "--output", metavar="FILE", help="Save the boundary (.stl, .ply, .glb) or all (.nc)."
+        ),
     ] = None,
     draw: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Draw it into a .png or .svg file.")
@@ -168,7 +170,7 @@ def _check_workspace_options(
         if path is not None and not path.parent.is_dir():
             raise WorkspaceError(f"{path.parent} is no directory; make it first")
     if output is not None:
-        check_suffix(output, len(names or "xyz"))
+        check_suffix(output, names or tuple("xyz"))
     if draw is not None and draw.suffix not in (".png", ".svg"):
         raise WorkspaceError(f"{draw} ends in {draw.suffix!r}; a figure's file ends in .png or .svg")
 

@@ -16,11 +16,11 @@ from exudyn import itemInterface as items
 from exudyn.rigidBodyUtilities import AngularVelocity2EulerParameters_t, RotationMatrix2EulerParameters
 from numpy.typing import NDArray
 
+from polypod.multibody.placement import BASE, PLATFORM, Placements, across, cross
+from polypod.multibody.tree import POINT, Body, Multibody
 from polypod.status import Status
 from polypod.verify.forced import Forced, inertial
-from polypod.verify.placement import BASE, PLATFORM, Placements, across, cross
 from polypod.verify.rows import Row, Slide, Start
-from polypod.verify.tree import POINT, Body, Multibody
 
 Array = NDArray[np.float64]
 Drive = Callable[[float], tuple[Array, Array]]

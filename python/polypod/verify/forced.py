@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from polypod.multibody.placement import PLATFORM
+from polypod.multibody.tree import Body, Multibody
 from polypod.status import Status
-from polypod.verify.placement import PLATFORM
 from polypod.verify.rows import Links, Start
-from polypod.verify.tree import Body, Multibody
 
 Array = NDArray[np.float64]
 

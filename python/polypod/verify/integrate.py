@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 from polypod.errors import PolypodError
 from polypod.mechanism import Mechanism
 from polypod.motion import Motion
+from polypod.multibody.tree import describe
 from polypod.solution import states_along
 from polypod.status import Status
 from polypod.verify.table import engine_class, load_at_o
-from polypod.verify.tree import describe
 
 Array = NDArray[np.float64]
 

@@ -9,20 +9,19 @@ far they gave way, and is not used.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
 from itertools import islice, pairwise
 from typing import Any
-from xml.etree import ElementTree
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from polypod.multibody.mjcf import Settings, configuration, skeleton
+from polypod.multibody.placement import PLATFORM
+from polypod.multibody.tree import Multibody
 from polypod.status import Status
 from polypod.verify.forced import Forced, inertial, light, pull
-from polypod.verify.placement import BASE, PLATFORM, cross, inverse, turn_about
 from polypod.verify.rows import Start
-from polypod.verify.tree import POINT, Body, Closure, Freedom, Multibody, joint_values
 
 Array = NDArray[np.float64]
 
@@ -52,7 +51,7 @@ def unit_of_mass(tree: Multibody) -> float:
 
 
 def mjcf(tree: Multibody, constraint: dict[str, str] | None = None) -> str:
-    """The mechanism as a model file for MuJoCo: a tree of bodies, and an equality for each closure [T64].
+    """The mechanism as a model file for MuJoCo: a tree of bodies, and equalities for each closure [T64].
 
     Masses, and so forces, are in `unit_of_mass`.
 
@@ -60,133 +59,21 @@ def mjcf(tree: Multibody, constraint: dict[str, str] | None = None) -> str:
         tree: the mechanism.
         constraint: attributes of all equalities, MuJoCo's own defaults without.
     """
-    root = ElementTree.Element("mujoco", model=tree.name)
-    ElementTree.SubElement(root, "compiler", angle="radian", autolimits="true")
-    flags = {"gravity": _text(tree.geometry["gravity"]), "timestep": repr(STEP), "integrator": "implicitfast"}
-    ElementTree.SubElement(
-        root, "option", flags | {"solver": "Newton", "jacobian": "dense", "tolerance": "0"}
+    unit = unit_of_mass(tree)
+
+    def scaled(given: tuple[float, Array]) -> tuple[float, Array]:
+        return given[0] / unit, given[1] / unit
+
+    settings = Settings(
+        option={
+            **{"timestep": repr(STEP), "integrator": "implicitfast"},
+            **{"solver": "Newton", "jacobian": "dense", "tolerance": "0"},
+        },
+        constraint=constraint or {},
+        inertial=lambda body: scaled(inertial(tree, body) if body.mass > 0.0 else light(tree)),
+        light=scaled(light(tree)),
     )
-    nodes = {BASE: ElementTree.SubElement(root, "worldbody")}
-    for body in tree.bodies:
-        place = inverse(tree.zero[body.parent]) @ body.zero
-        nodes[body.name] = _body(nodes[body.parent], tree, body, place)
-    equalities = ElementTree.SubElement(root, "equality")
-    for closure in tree.closures:
-        tie = _ties(tree, closure)
-        first, second = (nodes[body] for body in closure.bodies)
-        if tie.cross is not None:
-            first = _cross(first, tree, f"{closure.name} cross", tie.cross)
-        for k, points in enumerate(tie.points):
-            ends = zip((first, second), points, strict=True)
-            names = [
-                _site(node, f"{closure.name} {k} {side}", point) for side, (node, point) in enumerate(ends)
-            ]
-            sites = {"site1": names[0], "site2": names[1]}
-            ElementTree.SubElement(equalities, "connect", sites | (constraint or {}))
-    return ElementTree.tostring(root, encoding="unicode")
-
-
-@dataclass(frozen=True, eq=False)
-class Cross:
-    """The cross of a universal joint."""
-
-    origin: Array
-    """(3,), in the first body."""
-    hinge: Array
-    """(3,): axis about which it turns in the first body."""
-    own: Array
-    """(3,): its other axis, in its own axes."""
-    other: Array
-    """(3,): the same, in the axes of the second body."""
-
-
-@dataclass(frozen=True, eq=False)
-class Ties:
-    """A closure by points that coincide: MuJoCo's "connect" alone leaves out no term of the acceleration."""
-
-    points: tuple[tuple[Array, Array], ...]
-    """(3,) each, in the frames of the two bodies, or of the cross and the second body."""
-    cross: Cross | None
-    """Between the two bodies, for a universal joint."""
-
-
-def _ties(tree: Multibody, closure: Closure) -> Ties:
-    """Points on the axes that the two bodies have in common [T64]."""
-    if closure.points is None:
-        raise NotImplementedError(f"{closure.name}: MuJoCo's closures are at points")
-    (a, b), s = closure.points, tree.scale
-    first, second = (tree.zero[body][:3, :3] for body in closure.bodies)
-    turn = first.T @ second
-
-    def along(mine: Array, other: Array) -> tuple[Array, Array]:
-        """Points on an axis, `other` up to its sign, which is as at zero."""
-        return a + s * mine, b + s * np.sign((turn @ other) @ mine) * other
-
-    match closure.squares:
-        case ():
-            return Ties(((a, b),), None)
-        case ((x, y),):
-            mine = turn @ y
-            mine = mine - x * (x @ mine)
-            mine /= np.linalg.norm(mine)
-            return Ties(((POINT, b), (s * mine, b + s * y)), Cross(a, x, mine, y))
-        case ((x, y), (_, z)):
-            return Ties(((a, b), along(x, cross(y, z))), None)
-        case ((x, y), (_, z), (w, _)):
-            first = cross(y, z)
-            return Ties(((a, b), along(x, first), along(w, cross(first, z))), None)
-    raise NotImplementedError(f"{closure.name}: {len(closure.squares)} turns")
-
-
-def _cross(parent: Any, tree: Multibody, name: str, cross: Cross) -> Any:
-    """The cross of a universal joint, a body of hardly any mass."""
-    node = ElementTree.SubElement(parent, "body", name=name, pos=_text(cross.origin))
-    _joint(node, f"{name} 0", Freedom("revolute", cross.hinge))
-    _inertial(node, tree, POINT, *light(tree))
-    return node
-
-
-def _inertial(node: Any, tree: Multibody, center: Array, mass: float, inertia: Array) -> None:
-    numbers = np.array([mass, *np.diag(inertia), inertia[0, 1], inertia[0, 2], inertia[1, 2]])
-    mass, *six = (numbers / unit_of_mass(tree)).tolist()
-    ElementTree.SubElement(node, "inertial", pos=_text(center), mass=repr(mass), fullinertia=_text(six))
-
-
-def _body(parent: Any, tree: Multibody, body: Body, place: Array) -> Any:
-    node = ElementTree.SubElement(
-        parent, "body", name=body.name, pos=_text(place[:3, 3]), quat=_text(_quaternion(place))
-    )
-    for i, freedom in enumerate(body.freedoms):
-        _joint(node, f"{body.name} {i}", freedom)
-    _inertial(node, tree, body.center, *(inertial(tree, body) if body.mass > 0.0 else light(tree)))
-    return node
-
-
-def _joint(node: Any, name: str, freedom: Freedom) -> None:
-    match freedom.kind:
-        case "free":
-            ElementTree.SubElement(node, "freejoint", name=name)
-        case "spherical":
-            ElementTree.SubElement(node, "joint", name=name, type="ball")
-        case kind:
-            kinds = {"revolute": "hinge", "prismatic": "slide"}
-            ElementTree.SubElement(node, "joint", name=name, type=kinds[kind], axis=_text(freedom.axis))
-
-
-def _site(node: Any, name: str, point: Array) -> str:
-    ElementTree.SubElement(node, "site", name=name, pos=_text(point))
-    return name
-
-
-def _text(numbers: Any) -> str:
-    return " ".join(repr(float(x)) for x in numbers)
-
-
-def _quaternion(frame: Array) -> Array:
-    """(4,): w, x, y, z of a frame (4, 4)."""
-    quaternion = np.zeros(4)
-    mujoco.mju_mat2Quat(quaternion, frame[:3, :3].ravel())
-    return quaternion
+    return skeleton(tree, settings).text()
 
 
 class Model:
@@ -194,7 +81,6 @@ class Model:
 
     def __init__(self, tree: Multibody, constraint: dict[str, str] | None = None) -> None:
         self.tree, self.unit = tree, unit_of_mass(tree)
-        self._crosses = [(c, t) for c in tree.closures if (t := _ties(tree, c).cross) is not None]
         self.model = mujoco.MjModel.from_xml_string(mjcf(tree, constraint))
         self.data = mujoco.MjData(self.model)
         self._bodies = {body.name: self.model.body(body.name).id for body in tree.bodies}
@@ -249,24 +135,9 @@ class Model:
     def _put(self, start: Start) -> None:
         """All links where and as they move at the start."""
         model, data = self.model, self.data
-        placements = start.placements | {BASE: np.eye(4)}
-        for body in self.tree.bodies:
-            zero = inverse(self.tree.zero[body.parent]) @ body.zero
-            now = inverse(placements[body.parent]) @ placements[body.name]
-            values: list[Any] = list(joint_values(body, zero, now))
-            if body.name == PLATFORM:
-                values = [[*now[:3, 3], *_quaternion(now)]]
-            for i, value in enumerate(values):
-                if isinstance(value, np.ndarray):
-                    frame = np.eye(4)
-                    frame[:3, :3] = value
-                    value = _quaternion(frame)
-                first = self._joint(body.name, i).qposadr[0]
-                data.qpos[first : first + np.size(value)] = value
-        for closure, piece in self._crosses:
-            first, second = (placements[body][:3, :3] for body in closure.bodies)
-            angle = turn_about(piece.hinge, piece.own, first.T @ second @ piece.other)
-            data.qpos[self._joint(f"{closure.name} cross", 0).qposadr[0]] = angle
+        for name, value in configuration(self.tree, start.placements).items():
+            first = model.joint(name).qposadr[0]
+            data.qpos[first : first + len(value)] = value
         mujoco.mj_fwdPosition(model, data)
         rows = np.zeros((len(self.tree.bodies), 6, model.nv))
         for row, body in zip(rows, self.tree.bodies, strict=True):

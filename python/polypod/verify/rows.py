@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import qr
 
+from polypod.multibody.placement import BASE, PLATFORM, Placements, across, cross, inverse
+from polypod.multibody.tree import POINT, Body, Closure, Multibody, X, Y, Z
 from polypod.status import Status
-from polypod.verify.placement import BASE, PLATFORM, Placements, across, cross, inverse
-from polypod.verify.tree import POINT, Body, Closure, Multibody, X, Y, Z
 
 Array = NDArray[np.float64]
 

@@ -15,10 +15,10 @@ from polypod.arrays import check_wrench_axes
 from polypod.errors import MissingEngineError, PolypodError, ShapeError, UnknownNameError
 from polypod.mechanism import Mechanism
 from polypod.motion import Motion
+from polypod.multibody.tree import Multibody, describe
 from polypod.solution import states_along
 from polypod.status import Status
 from polypod.verify.forced import pull
-from polypod.verify.tree import Multibody, describe
 
 Array = NDArray[np.float64]
 Values = dict[str, Array]

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from polypod.mechanism import Mechanism
-from polypod.verify.placement import (
+from polypod.multibody.placement import (
     BASE,
     PLATFORM,
     Placements,

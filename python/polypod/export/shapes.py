@@ -1,0 +1,118 @@
+"""What links look like in a model file: meshes of their pieces by colour, or simple shapes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+import trimesh
+from numpy.typing import NDArray
+
+from polypod.bodies import Link, leg_radii, links_of
+from polypod.mechanism import Mechanism
+from polypod.multibody.placement import across, leg_bodies, rod_body
+from polypod.style import PALE, color_of
+
+Array = NDArray[np.float64]
+
+PLAIN = "#9AA0A6"
+"""Of simple shapes that are no legs."""
+PART = 0.6
+"""Length of a simple cylinder and piston, by the leg's length at home."""
+
+
+@dataclass(frozen=True, eq=False)
+class Shape:
+    """A visible part of a link."""
+
+    name: str
+    kind: Literal["mesh", "cylinder", "sphere"]
+    frame: Array
+    """(4, 4): in the link's axes; a cylinder lies along its third axis, about its origin."""
+    size: tuple[float, ...]
+    """Radius and length of a cylinder, radius of a sphere, m; none for a mesh."""
+    color: str
+    """Such as #C9CDD3."""
+    mesh: trimesh.Trimesh | None = None
+
+    @property
+    def rgba(self) -> tuple[float, float, float, float]:
+        """Parts from 0 to 1."""
+        red, green, blue = (int(self.color[i : i + 2], 16) / 255.0 for i in (1, 3, 5))
+        return red, green, blue, 1.0
+
+
+def body_name(mech: Mechanism, link: Link) -> str:
+    """The multibody description's name of a link."""
+    spec = mech.geometry
+    match link.kind:
+        case "rod":
+            return rod_body(spec["rods"][link.index])
+        case "cylinder" | "piston":
+            return leg_bodies(spec["legs"][link.index])[link.kind == "piston"]
+    return link.kind
+
+
+def meshes(mech: Mechanism) -> dict[str, list[Shape]]:
+    """Of each body, its pieces of one colour as one mesh, in the body's axes."""
+    shapes = {}
+    for link in links_of(mech):
+        body = body_name(mech, link)
+        by_color: dict[str, list[trimesh.Trimesh]] = {}
+        for piece in link.pieces:
+            by_color.setdefault(piece.color, []).append(piece.mesh)
+        shapes[body] = [
+            Shape(f"{body} mesh {i}", "mesh", np.eye(4), (), color, _joined(pieces))
+            for i, (color, pieces) in enumerate(by_color.items(), 1)
+        ]
+    return shapes
+
+
+def _joined(pieces: list[trimesh.Trimesh]) -> trimesh.Trimesh:
+    joined: trimesh.Trimesh = trimesh.util.concatenate([piece.copy() for piece in pieces])  # type: ignore[assignment]
+    return joined
+
+
+def simple(mech: Mechanism) -> dict[str, list[Shape]]:
+    """Of each body some cylinders and spheres, in the body's axes."""
+    spec, radii = mech.geometry, leg_radii(mech)
+    lengths = mech.inverse_kinematics(mech.home).lengths
+    shapes: dict[str, list[Shape]] = {"base": [], "platform": []}
+    for k, rod in enumerate(spec["rods"]):
+        points = [np.array(leg["base"]["point"]) for leg in spec["legs"] if leg["base"]["rod"] == k]
+        line = np.array(rod["axis"]) / np.linalg.norm(rod["axis"])
+        along = [float((point - rod["point"]) @ line) for point in points]
+        radius = max(radii)
+        ends = np.array([[min(along) - radius, 0.0, 0.0], [max(along) + radius, 0.0, 0.0]])
+        shapes[rod_body(rod)] = [_bar(f"{rod_body(rod)} bar", ends, 0.6 * radius, PLAIN)]
+    for i, leg in enumerate(spec["legs"]):
+        cylinder, piston = leg_bodies(leg)
+        color, part = color_of(i) if leg["actuated"] else PALE, PART * float(lengths[i])
+        for body, end, radius in ((cylinder, part, radii[i]), (piston, -part, 0.55 * radii[i])):
+            ends = np.array([[0.0, 0.0, 0.0], [0.0, end, 0.0]])
+            shapes[body] = [_bar(f"{body} bar", ends, radius, color)]
+        shapes["base"].append(_ball(f"base ball {leg['name']}", leg["base"]["point"], 1.2 * radii[i]))
+        shapes["platform"].append(
+            _ball(f"platform ball {leg['name']}", leg["platform"]["point"], 1.2 * radii[i])
+        )
+        spoke = np.array([[0.0, 0.0, 0.0], leg["platform"]["point"]])
+        if np.linalg.norm(spoke[1]) > radii[i]:
+            shapes["platform"].append(_bar(f"platform spoke {leg['name']}", spoke, 0.5 * radii[i], PLAIN))
+    return shapes
+
+
+def _ball(name: str, center: list[float], radius: float) -> Shape:
+    frame = np.eye(4)
+    frame[:3, 3] = center
+    return Shape(name, "sphere", frame, (radius,), PLAIN)
+
+
+def _bar(name: str, ends: Array, radius: float, color: str) -> Shape:
+    """A cylinder between two points (2, 3)."""
+    length = float(np.linalg.norm(ends[1] - ends[0]))
+    axis = (ends[1] - ends[0]) / length
+    frame = np.eye(4)
+    frame[:3, :3] = np.column_stack([*across(axis), axis])
+    frame[:3, 3] = ends.mean(axis=0)
+    return Shape(name, "cylinder", frame, (radius, length), color)

@@ -1,0 +1,97 @@
+"""What the tests of exported files share: mechanisms, and what a reader must find of their links."""
+
+from __future__ import annotations
+
+import functools
+import sys
+from pathlib import Path
+
+import numpy as np
+
+import polypod as pp
+from polypod.bodies import link_frames, links_of
+from polypod.export.shapes import body_name
+from polypod.multibody.tree import describe
+
+sys.path.insert(0, str(Path(__file__).parent))
+import test_oracle as cases
+
+DATA = Path(__file__).parent / "data"
+LU = "lu-3spu-2rpu-r"
+MECHANISMS = (LU, "ups-hexapod", "3-rps", "rod-lined", "rpr", "upf", "fpu", "fpf", "passive", "massless")
+"""The paper's; six UPS; three RPS; legs coupled by a rod; R, F and U at either end; passive; no masses."""
+
+NASTY = {"1": "a/b", "2": "a b", "3": "a_b", "4": "αβ-->", "5": '<5 & "6">'}
+"""Names of legs that no format takes, and that become the same."""
+
+
+@functools.cache
+def mechanism(name):
+    """By name; never changed."""
+    if name == LU:
+        return pp.load(name)
+    if name == "massless":
+        return without_masses()
+    return pp.load(DATA / f"{name}.toml") if name in ("ups-hexapod", "3-rps") else cases.case(name).mech
+
+
+def without_masses():
+    """Six UPS legs whose links have no masses, but for the platform."""
+    tables = pp.load(DATA / "ups-hexapod.toml").to_dict()
+    for leg in tables["legs"]:
+        leg.pop("cylinder", None)
+        leg.pop("piston", None)
+    return pp.Mechanism.from_dict(tables)
+
+
+def nasty():
+    """The paper's mechanism with names that no format takes."""
+    tables = pp.load(LU).to_dict()
+    tables["name"] = "--> </robot> \x07 Müller's \N{ROBOT FACE}"
+    tables["rods"][0]["name"] = "L/1"
+    for leg in tables["legs"]:
+        leg["name"] = NASTY[leg["name"]]
+        if "rod" in leg["base"]:
+            leg["base"]["rod"] = "L/1"
+    return pp.Mechanism.from_dict(tables)
+
+
+def regular_pose(mech):
+    """A pose that is not nearly singular: home, but for the paper's mechanism."""
+    if mech.name != LU:
+        return mech.home
+    return mech.pose({"alpha": 0.1, "p": -0.30, "h": 0.62, "beta": 0.7, "gamma": 0.6})
+
+
+def nearby_poses(mech, count=2):
+    """Poses about the regular one, with all constraints kept."""
+    rng = np.random.default_rng(7)
+    start = mech.inverse_kinematics(regular_pose(mech)).lengths
+    found = []
+    while len(found) < count:
+        lengths = start + 0.02 * mech.characteristic_length * rng.normal(size=mech.n_legs)
+        at = mech.forward_kinematics(lengths, regular_pose(mech))
+        if at.status == pp.Status.OK:
+            found.append(at.pose)
+    return np.stack(found)
+
+
+def places(mech, pose):
+    """Frame (4, 4) of each body as the core has it, by the names of the multibody description."""
+    frames = link_frames(mech, pose)
+    links = links_of(mech)
+    names = [body_name(mech, link) for link in links]
+    # A leg with S at both ends spins as it likes.
+    spins = [link.kind in ("cylinder", "piston") and mech.leg_letters[link.index] == "SPS" for link in links]
+    known = frames.turn_known & ~np.array(spins)
+    return dict(zip(names, frames.frames, strict=True)), dict(zip(names, known, strict=True))
+
+
+def bodies(mech):
+    """Mass, centre and inertia of each link, straight from the mechanism file, by the same names."""
+    spec = mech.geometry
+    given = {"platform": spec["platform"]} | {f"rod {rod['name']}": rod["body"] for rod in spec["rods"]}
+    for leg in spec["legs"]:
+        given |= {f"leg {leg['name']} {part}": leg[part] for part in ("cylinder", "piston")}
+    assert given.keys() == {body.name for body in describe(mech).bodies}
+    return given
