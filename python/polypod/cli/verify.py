@@ -8,7 +8,18 @@ import typer
 from rich.console import Console
 from rich.markup import escape
 
-from polypod.cli import JsonOption, MechanismArgument, _bar, _console, _g, _print_json, _table, app
+from polypod.cli.shared import (
+    JsonOption,
+    MechanismArgument,
+    MotionArgument,
+    console,
+    new_table,
+    print_json,
+    progress_bar,
+    significant,
+)
+
+app = typer.Typer()
 
 
 @app.command(
@@ -17,10 +28,7 @@ from polypod.cli import JsonOption, MechanismArgument, _bar, _console, _g, _prin
 )
 def verify(
     mechanism: MechanismArgument,
-    motion: Annotated[
-        str,
-        typer.Argument(metavar="MOTION", help="A motion file (.csv or .toml) or a built-in motion's name."),
-    ],
+    motion: MotionArgument,
     engine: Annotated[
         list[str] | None,
         typer.Option(metavar="NAME", help="Engine: pinocchio (the default), exudyn, mujoco; repeatable."),
@@ -59,7 +67,7 @@ def verify(
     compared = path
     if samples is not None:
         compared = path.sample(np.linspace(path.time[0], path.time[-1], samples))
-    with _bar("comparing", len(compared.time)) as progress:
+    with progress_bar("comparing", len(compared.time)) as progress:
         found = verify_motion(
             mech,
             compared,
@@ -69,14 +77,14 @@ def verify(
         )
     facts = found.facts()
     if integration:
-        with _bar("integrating", 1) as progress:
+        with progress_bar("integrating", 1) as progress:
             followed = integrate(mech, path, progress=progress)
         facts["integration"] = followed.facts()
         facts["agrees"] = found.agrees and followed.agrees
     if as_json:
-        _print_json(facts)
+        print_json(facts)
     else:
-        _print_verification(_console(), facts)
+        _print_verification(console(), facts)
     if not facts["agrees"]:
         raise typer.Exit(1)
 
@@ -91,7 +99,7 @@ def _print_verification(out: Console, facts: dict[str, Any]) -> None:
     for engine in facts["engines"]:
         title = f"Errors against {engine['engine']} {engine['version']}"
         headers = ("max error>", "rms>", "relative>", "rms>", "at / s>", "part")
-        table = _table(title, "", "unit", *headers, "")
+        table = new_table(title, "", "unit", *headers, "")
         table.box, table.pad_edge, table.collapse_padding = None, False, True
         for row in engine["quantities"]:
             errors = (row[key] for key in ("max", "rms", "relative_max", "relative_rms"))
@@ -99,8 +107,8 @@ def _print_verification(out: Console, facts: dict[str, Any]) -> None:
             table.add_row(
                 "≈ " * row["approximate"] + row["title"],
                 escape(row["unit"]),
-                *(_g(error, 2) for error in errors),
-                _g(time),
+                *(significant(error, 2) for error in errors),
+                significant(time),
                 escape(part),
                 "" if row["agrees"] else "[bold red]exceeds[/bold red]",
             )
@@ -118,12 +126,12 @@ def _print_integration(out: Console, facts: dict[str, Any]) -> None:
     from polypod.verify.report import integration_verdict
 
     headers = ("position / m>", "rotation / rad>", "legs / m>", "order>")
-    table = _table("The motion under the forces, by step", "step / s>", *headers)
+    table = new_table("The motion under the forces, by step", "step / s>", *headers)
     table.box, table.pad_edge = None, False
     for row in facts["steps"]:
         errors = (row["errors"][key] for key in ("position", "rotation", "lengths"))
         order = "" if row["order"] is None else f"{row['order']:.2f}"
-        table.add_row(_g(row["step"]), *(_g(error, 2) for error in errors), order)
+        table.add_row(significant(row["step"]), *(significant(error, 2) for error in errors), order)
     out.print(table)
     colour = "green" if facts["agrees"] else "red"
     out.print(f"[bold {colour}]{escape(integration_verdict(facts))}[/bold {colour}]")

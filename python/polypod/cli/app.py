@@ -1,0 +1,65 @@
+"""The application: its commands, and what becomes of wrong input."""
+
+from __future__ import annotations
+
+import sys
+from importlib import import_module
+from typing import Annotated
+
+import typer
+
+from polypod.errors import PolypodError
+
+# The modules of the commands, in the order of the help. A command imports what is heavy where it needs it,
+# so that help comes at once.
+COMMANDS = (
+    "demo",
+    "info",
+    "solve",
+    "simulate",
+    "fk",
+    "workspace",
+    "verify",
+)
+
+app = typer.Typer(
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode="rich",
+    epilog="Start with: [bold]polypod demo[/bold]",
+)
+for name in COMMANDS:
+    app.add_typer(import_module(f"polypod.cli.{name}").app)
+
+
+def main() -> None:
+    """Runs the command line; whatever is wrong with the input becomes one message and exit status 2."""
+    try:
+        app()
+    except (PolypodError, OSError) as error:
+        print(f"polypod: {_readable(error)}", file=sys.stderr)
+        sys.exit(2)
+
+
+def _readable(error: Exception) -> str:
+    if isinstance(error, OSError) and error.strerror:
+        return f"{error.filename}: {error.strerror}" if error.filename else error.strerror
+    return str(error)
+
+
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        from polypod import __version__
+
+        print(f"polypod {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _polypod(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version.")
+    ] = False,
+) -> None:
+    """Kinematics and dynamics of parallel manipulators on telescopic legs."""
