@@ -143,8 +143,8 @@ def _pyplot_figure(size: tuple[float, float], **more: Any) -> Figure:
 
 
 @dataclass(frozen=True)
-class _Panel:
-    """Curves over time in one unit, as they are drawn."""
+class Panel:
+    """Curves over time in one unit, as they are drawn; texts as matplotlib takes them, with $formulas$."""
 
     label: str
     unit: str
@@ -170,7 +170,7 @@ def plot_fig4(solution: Solution, figure: Figure | None = None) -> Figure:
     as zero.
     """
     data = solution.dataset
-    panels = [panel for panel in _panels(data) if panel is not None]
+    panels = fig4_panels(data)
     columns = 3
     rows = -(-len(panels) // columns)
     with house_style():
@@ -202,7 +202,7 @@ def plot_fig4(solution: Solution, figure: Figure | None = None) -> Figure:
     return figure
 
 
-def _draw_panel(ax: Axes, panel: _Panel, time: Array, lost: NDArray[np.bool_]) -> None:
+def _draw_panel(ax: Axes, panel: Panel, time: Array, lost: NDArray[np.bool_]) -> None:
     for i, curve in enumerate(panel.curves):
         ax.plot(time, panel.values[:, i], color=color_of(i), linestyle=dash_of(i), label=curve)
     for level in panel.limits:
@@ -231,22 +231,23 @@ def _spans(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
     return [(int(a), int(b) - 1) for a, b in edges.reshape(-1, 2)]
 
 
-def _panels(data: xr.Dataset) -> list[_Panel | None]:
+def fig4_panels(data: xr.Dataset) -> list[Panel]:
+    """The panels of the paper's Fig. 4 in its order: platform, legs, forces; see `plot_fig4`."""
     legs = [math_name(str(name)) for name in data["leg"].to_numpy()]
 
-    def six(name: str, part: int, label: str, symbol: str, unit: str, scale: float = 1.0) -> _Panel:
+    def six(name: str, part: int, label: str, symbol: str, unit: str, scale: float = 1.0) -> Panel:
         values = scale * data[name].to_numpy()[:, 3 * part : 3 * part + 3]
-        return _Panel(label, unit, values, tuple(f"${symbol}_{c}$" for c in _COMPONENTS))
+        return Panel(label, unit, values, tuple(f"${symbol}_{c}$" for c in _COMPONENTS))
 
-    def of_legs(name: str, label: str, symbol: str, unit: str, scale: float = 1.0) -> _Panel:
+    def of_legs(name: str, label: str, symbol: str, unit: str, scale: float = 1.0) -> Panel:
         curves = tuple(f"${symbol.replace('#', leg)}$" for leg in legs)
         values = scale * data[name].to_numpy()
-        return _Panel(label, unit, values, curves, _stroke(data) if name == "length" else ())
+        return Panel(label, unit, values, curves, _stroke(data) if name == "length" else ())
 
     position = 1e3 * data["pose"].to_numpy()[:, :3, 3]
     forces = of_legs("force", "active force $f_a$", "f_{a#}", "N")
-    return [
-        _Panel("position of $o$", "mm", position, ("$X_o$", "$Y_o$", "$Z_o$")),
+    panels = [
+        Panel("position of $o$", "mm", position, ("$X_o$", "$Y_o$", "$Z_o$")),
         six("twist", 0, "velocity $v$", "v", "mm s$^{-1}$", 1e3),
         six("acceleration", 0, "acceleration $a$", "a", "mm s$^{-2}$", 1e3),
         six("twist", 1, r"angular velocity $\omega$", r"\omega", "rad s$^{-1}$"),
@@ -255,10 +256,11 @@ def _panels(data: xr.Dataset) -> list[_Panel | None]:
         of_legs("length", "leg length $r$", "r_{#}", "mm", 1e3),
         of_legs("rate", "leg rate $v_r$", "v_{r#}", "mm s$^{-1}$", 1e3),
         of_legs("leg_acceleration", "leg acceleration $a_r$", "a_{r#}", "mm s$^{-2}$", 1e3),
-        _in_kilo(forces),
+        in_kilo(forces),
         _second_forces(data),
         _torque(data),
     ]
+    return [panel for panel in panels if panel is not None]
 
 
 def _stroke(data: xr.Dataset) -> tuple[float, ...]:
@@ -270,7 +272,7 @@ def _stroke(data: xr.Dataset) -> tuple[float, ...]:
     return tuple(1e3 * limits[0]) if len(limits) == 1 and np.isfinite(limits).all() else ()
 
 
-def _orientation(data: xr.Dataset) -> _Panel | None:
+def _orientation(data: xr.Dataset) -> Panel | None:
     """The angles among the motion's coordinates, or without any the direction that it has in their place."""
     names = [str(n) for n in data if str(n).startswith("coordinate_") and "rate_" not in str(n)]
     angles = [n for n in names if data[n].attrs["units"] == "rad"]
@@ -282,8 +284,8 @@ def _orientation(data: xr.Dataset) -> _Panel | None:
     shorts = [n.removeprefix("coordinate_") for n in chosen]
     curves = tuple(_GREEK.get(s) or _subscripted(s) for s in shorts)
     if pure:
-        return _Panel("tool axis", "", values, curves)
-    return _Panel("angle", "deg", np.degrees(values), curves)
+        return Panel("tool axis", "", values, curves)
+    return Panel("angle", "deg", np.degrees(values), curves)
 
 
 def _subscripted(name: str) -> str:
@@ -292,36 +294,36 @@ def _subscripted(name: str) -> str:
     return f"${stem}$" if name[-1] not in "xyz" else f"${math_name(stem)}_{index}$"
 
 
-def _second_forces(data: xr.Dataset) -> _Panel:
+def _second_forces(data: xr.Dataset) -> Panel:
     """Couple-constrained forces, else constraint multipliers, else what the actuators give."""
     if "coupled_force" in data:
         curves = tuple(f"$f_{{c{math_name(str(leg))}}}$" for leg in data["coupled_leg"].to_numpy())
-        return _in_kilo(_Panel("coupled force $f_c$", "N", data["coupled_force"].to_numpy(), curves))
+        return in_kilo(Panel("coupled force $f_c$", "N", data["coupled_force"].to_numpy(), curves))
     if "constraint" in data:
         values = data["constraint"].to_numpy()
         curves = tuple(f"$f_{{c,{i + 1}}}$" for i in range(values.shape[1]))
         # Kind A-E stands first; D keeps the angle between two directions, E compares two legs' moments.
         kinds = [str(row)[0] for row in data["constraint_row"].to_numpy()]
         units = {{"D": "N m", "E": "N m$^{-1}$"}.get(kind, "N") for kind in kinds}
-        return _Panel("constraint $f_c$", " or ".join(sorted(units)), values, curves)
-    return _in_kilo(_Panel("actuator power", "W", data["actuator_power"].to_numpy()[:, None], ("$P$",)))
+        return Panel("constraint $f_c$", " or ".join(sorted(units)), values, curves)
+    return in_kilo(Panel("actuator power", "W", data["actuator_power"].to_numpy()[:, None], ("$P$",)))
 
 
-def _torque(data: xr.Dataset) -> _Panel:
+def _torque(data: xr.Dataset) -> Panel:
     """The couple-constrained torque, else the distance from a singularity."""
     if "coupled_torque" in data:
         values = data["coupled_torque"].to_numpy()[:, None]
-        return _in_kilo(_Panel("coupled torque $T_c$", "N m", values, ("$T_c$",)))
+        return in_kilo(Panel("coupled torque $T_c$", "N m", values, ("$T_c$",)))
     values = data["sigma_min"].to_numpy()[:, None]
-    return _Panel("smallest singular value", "", values, (r"$\sigma_\mathrm{min}$",))
+    return Panel("smallest singular value", "", values, (r"$\sigma_\mathrm{min}$",))
 
 
-def _in_kilo(panel: _Panel) -> _Panel:
+def in_kilo(panel: Panel) -> Panel:
     """Numbers of five digits and more in thousands."""
     finite = panel.values[np.isfinite(panel.values)]
     if not np.max(np.abs(finite), initial=0.0) >= 1e4:
         return panel
-    return _Panel(panel.label, f"k{panel.unit}", panel.values / 1e3, panel.curves)
+    return Panel(panel.label, f"k{panel.unit}", panel.values / 1e3, panel.curves)
 
 
 # --- the topology graph of Fig. 1b --------------------------------------------------------------------------

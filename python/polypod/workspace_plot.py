@@ -136,7 +136,7 @@ def _draw_faces(ax: Axes, workspace: Workspace, points: Array, right: Array, up:
     light = np.clip(smooth @ (_LIGHT / np.linalg.norm(_LIGHT)), 0.0, 1.0)
     palette = np.array([to_rgb(color) for color in workspace.colors])
     brightness = _DARKEST + (1.0 - _DARKEST) * light[:, None]
-    colors = (palette[_face_labels(workspace)[seen]] * brightness)[order]
+    colors = (palette[face_labels(workspace)[seen]] * brightness)[order]
     flat = (corners @ np.stack([right, up], axis=1))[order]
     # Edges of the same colour close the seams; as a picture inside the SVG the many faces stay small.
     ax.add_collection(
@@ -155,7 +155,7 @@ def _smoothed(workspace: Workspace, normals: Array) -> Array:
     return np.asarray(mixed / np.maximum(np.linalg.norm(mixed, axis=1, keepdims=True), 1e-300))
 
 
-def _face_labels(workspace: Workspace) -> NDArray[np.int64]:
+def face_labels(workspace: Workspace) -> NDArray[np.int64]:
     """(f,): the label that most corners have, else that of the first."""
     first, second, third = workspace.labels[workspace.faces].T
     return np.asarray(np.where(second == third, second, first))
