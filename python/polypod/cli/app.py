@@ -20,6 +20,7 @@ COMMANDS = (
     "fk",
     "workspace",
     "verify",
+    "report",
 )
 
 app = typer.Typer(

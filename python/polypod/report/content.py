@@ -56,22 +56,27 @@ def gather(
     mech: Mechanism,
     motion: MotionSource | None,
     *,
+    samples: int | None = None,
     workspace: Workspace | bool = True,
     step: float | None = None,
     paper: list[tuple[str, str]] | None = None,
     progress: Progress | None = None,
 ) -> Content:
     """Solves what a report needs; `paper` and a `workspace` are taken as they are where given."""
-    found, why = workspace_of(mech, workspace, step)
-    along = None
-    path: Motion | None = None
+    along, path = None, None
     if motion is not None:
         read, source = read_motion(motion, mech)
-        path = read if isinstance(read, Motion) else None
-        solution = solve(mech, read, progress=progress) if isinstance(read, Motion) else read
-        along = along_of(mech, solution, source)
+        if isinstance(read, Motion):
+            path = read if samples is None else _sampled(read, samples)
+            read = solve(mech, path, progress=progress)
+        along = along_of(mech, read, source)
+    found, why = workspace_of(mech, workspace, step)
     tables = paper_tables(mech, path) if paper is None else paper
     return Content(mech, describe(mech), mechanism_source(mech), along, found, why, tables)
+
+
+def _sampled(motion: Motion, samples: int) -> Motion:
+    return motion.sample(np.linspace(motion.time[0], motion.time[-1], samples))
 
 
 def along_of(mech: Mechanism, solution: Solution, source: Source) -> Along:

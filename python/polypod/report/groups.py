@@ -85,7 +85,7 @@ def _plain(name: str) -> str:
 # --- reactions ----------------------------------------------------------------------------------------------
 
 
-def reaction_charts(mech: Mechanism, time: Array, found: Reactions) -> list[Chart]:
+def reaction_charts(mech: Mechanism, found: Reactions) -> list[Chart]:
     """Sizes of force and torque for each kind of joint, a curve for each leg or rod."""
     charts = []
     kinds = ((found.force, "force", "F", "N"), (found.torque, "torque", "T", "N m"))
@@ -94,7 +94,7 @@ def reaction_charts(mech: Mechanism, time: Array, found: Reactions) -> list[Char
             of = mech.rod_names if family == "rods" else mech.leg_names
             curves = tuple(f"${symbol}_{{{math_name(owner)}}}$" for owner in of)
             panel = Panel(f"{name} $|{symbol}|$, {family}", unit, values[:, indices], curves)
-            charts.append(Chart(in_kilo(panel), time))
+            charts.append(Chart(in_kilo(panel), found.time))
     return charts
 
 
@@ -127,11 +127,11 @@ def _distance_charts(mech: Mechanism, data: xr.Dataset) -> list[Chart]:
     nearest = np.min(found.distance, axis=-1)
     nearest = np.where(np.isfinite(nearest), nearest, np.nan)
     charts = []
-    for si, unit, scale, what in (("m", "mm", 1e3, "lengths"), ("rad", "deg", 180.0 / np.pi, "angles")):
+    for si, unit, scale in (("m", "mm", 1e3), ("rad", "deg", 180.0 / np.pi)):
         of = [i for i, name in enumerate(found.coordinates) if coordinate_unit(name) == si]
         if of and np.isfinite(nearest[:, of]).any():
             curves = tuple(_coordinate(found.coordinates[i]) for i in of)
-            panel = Panel(f"distance to singular, {what}", unit, scale * nearest[:, of], curves)
+            panel = Panel("distance to singular", unit, scale * nearest[:, of], curves)
             charts.append(Chart(panel, data["time"].to_numpy()[at], dots=True))
     return charts
 

@@ -189,6 +189,7 @@
   // --- the workspace in space -------------------------------------------------------------------------------
 
   const space = document.getElementById("space");
+  const through = document.getElementById("through");
   let figure = null;
 
   function spaceLayout() {
@@ -207,16 +208,19 @@
   }
 
   function spaceTraces() {
+    const opacity = through.checked ? 0.35 : 1;
     // Black lines would be lost on a dark page.
-    const swap = (trace) =>
-      trace.line && trace.line.color === "#000000" ? { ...trace, line: { ...trace.line, color: theme().curves[6] } } : trace;
-    return figure.data.map(swap);
+    const lit = (line) => (line.color === "#000000" ? { ...line, color: theme().curves[6] } : line);
+    return figure.data.map((trace) =>
+      trace.type === "mesh3d" ? { ...trace, opacity } : { ...trace, line: lit(trace.line) },
+    );
   }
 
   function makeSpace() {
     if (figure !== null) return;
     figure = JSON.parse(document.getElementById("figure").textContent);
     Plotly.newPlot(space, spaceTraces(), spaceLayout(), { displaylogo: false, responsive: true });
+    through.addEventListener("change", () => Plotly.react(space, spaceTraces(), spaceLayout()));
   }
 
   // --- when -------------------------------------------------------------------------------------------------

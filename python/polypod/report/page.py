@@ -34,6 +34,7 @@ def report_html(
     mech: Mechanism,
     motion: MotionSource | None = None,
     *,
+    samples: int | None = None,
     workspace: Workspace | bool = True,
     step: float | None = None,
     command: str = "",
@@ -44,6 +45,7 @@ def report_html(
     Args:
         mech: the mechanism.
         motion: a motion file or a built-in motion's name, a `Motion`, or a `Solution` of one.
+        samples: solve at so many instants evenly over the motion instead of at its own.
         workspace: whether to find the reachable workspace; or one that is there already.
         step: width of the workspace's cells, m; by default the widest bounds have 64.
         command: the command line that is told for reproduction.
@@ -54,7 +56,7 @@ def report_html(
         UnknownNameError: no such motion.
         WorkspaceError: a step with which no workspace is found. Without one the page says why there is none.
     """
-    content = gather(mech, motion, workspace=workspace, step=step, progress=progress)
+    content = gather(mech, motion, samples=samples, workspace=workspace, step=step, progress=progress)
     return render(content, command)
 
 
@@ -62,15 +64,21 @@ def write_report(
     mech: Mechanism,
     path: str | PathLike[str],
     motion: MotionSource | None = None,
-    *,
-    workspace: Workspace | bool = True,
-    step: float | None = None,
-    command: str = "",
-    progress: Progress | None = None,
+    **more: Any,
 ) -> None:
-    """Writes the page of `report_html` to a file, which appears whole or not at all; arguments as there."""
-    html = report_html(mech, motion, workspace=workspace, step=step, command=command, progress=progress)
-    save(html, path)
+    """Writes the page of `report_html` to a file, which appears whole or not at all.
+
+    Args:
+        mech: the mechanism.
+        path: the file; it is overwritten.
+        motion: as for `report_html`.
+        more: the other arguments of `report_html`.
+
+    >>> import polypod as pp
+    >>> mech = pp.load("lu-3spu-2rpu-r")
+    >>> pp.write_report(mech, "report.html", "lu-3spu-2rpu-r", samples=21, workspace=False)
+    """
+    save(report_html(mech, motion, **more), path)
 
 
 def save(html: str, path: str | PathLike[str]) -> None:
@@ -148,7 +156,6 @@ def _mechanism(content: Content) -> dict[str, Any]:
 def _motion(mech: Mechanism, along: Along, series: Series) -> dict[str, Any]:
     solution, facts = along.solution, along.facts
     data = solution.dataset
-    time = data["time"].to_numpy()
 
     def shown(charts: list[Chart]) -> list[dict[str, Any]]:
         return [series.add(chart) for chart in charts]
@@ -163,8 +170,9 @@ def _motion(mech: Mechanism, along: Along, series: Series) -> dict[str, Any]:
         "fig4": shown(groups.motion_charts(solution)),
         "actuators": actuators_table(along.actuators),
         "actuator_charts": shown(groups.actuator_charts(mech, solution)),
-        "reactions": reactions_table(time, along.reactions),
-        "reaction_charts": shown(groups.reaction_charts(mech, time, along.reactions)),
+        "reactions": reactions_table(along.reactions),
+        "reaction_charts": shown(groups.reaction_charts(mech, along.reactions)),
+        "looked_at": (len(along.reactions.time), along.reactions.of),
         "undetermined": bool(along.reactions.undetermined.any()),
         "singularity_charts": shown(groups.singularity_charts(mech, solution)),
         "legs": [(name, shown(groups.leg_charts(data, i))) for i, name in enumerate(mech.leg_names)],

@@ -9,11 +9,15 @@ from numpy.typing import NDArray
 
 from polypod.answers import Joint
 from polypod.mechanism import Mechanism
+from polypod.report.decimate import kept
 from polypod.results import Solution
 from polypod.solution import CHUNK
 from polypod.tables import Table, fixed
 
 Array = NDArray[np.float64]
+
+STATES = 20_000
+"""States that are looked at, at most, about: reactions take much longer than all other quantities."""
 
 COMPONENTS = ("force 1", "force 2", "force 3", "torque 1", "torque 2", "torque 3")
 """Of a reaction in joint axes, as in the variables of a solution."""
@@ -21,24 +25,33 @@ COMPONENTS = ("force 1", "force 2", "force 3", "torque 1", "torque 2", "torque 3
 
 @dataclass(frozen=True)
 class Reactions:
-    """Reactions without couples in U joints [T47] of j joints, as sizes."""
+    """Reactions without couples in U joints [T47] of j joints at N instants, as sizes."""
 
+    time: Array
+    """(N,), s."""
+    of: int
+    """Number of all states; of a long motion N are looked at."""
     joints: tuple[Joint, ...]
     force: Array
-    """(time, j): |F|, N."""
+    """(N, j): |F|, N."""
     torque: Array
-    """(time, j): |T| about the joint's point, N m."""
+    """(N, j): |T| about the joint's point, N m."""
     undetermined: NDArray[np.bool_]
     """(j, 6): components in joint axes that balance alone leaves open at one state or more."""
 
 
 def reactions_along(mech: Mechanism, solution: Solution) -> Reactions:
-    """The reactions at all states, some states at a time: only their sizes are kept."""
+    """The reactions, some states at a time: only their sizes are kept.
+
+    Of a motion with more than `STATES` states those are taken that are spread evenly over it, and those at
+    which active forces are least and greatest nearby.
+    """
     data = solution.dataset
+    at = _chosen(data["force"].to_numpy())
     pose, twist, acceleration, wrench = (
-        data[name].to_numpy() for name in ("pose", "twist", "acceleration", "wrench")
+        data[name].to_numpy()[at] for name in ("pose", "twist", "acceleration", "wrench")
     )
-    axes, count = data.attrs["wrench_axes"], len(pose)
+    axes, count = data.attrs["wrench_axes"], len(at)
     joints = mech.joint_list
     force, torque = np.full((2, count, len(joints)), np.nan)
     undetermined = np.zeros((len(joints), 6), dtype=np.bool_)
@@ -49,14 +62,20 @@ def reactions_along(mech: Mechanism, solution: Solution) -> Reactions:
         torque[chunk] = np.linalg.norm(answer.reactions[..., 3:], axis=-1)
         known = np.isfinite(answer.reactions).all(axis=(-2, -1))
         undetermined |= ~answer.determinate_in_joint[known].all(axis=0)
-    return Reactions(joints, force, torque, undetermined)
+    return Reactions(data["time"].to_numpy()[at], len(data["time"]), joints, force, torque, undetermined)
 
 
-def reactions_table(time: Array, found: Reactions) -> Table:
+def _chosen(forces: Array) -> NDArray[np.int64]:
+    """Indices of the states that are looked at."""
+    even = np.linspace(0, len(forces) - 1, min(STATES // 2, len(forces))).astype(np.int64)
+    return np.union1d(even, kept(forces, STATES // 2)) if len(forces) > STATES else np.arange(len(forces))
+
+
+def reactions_table(found: Reactions) -> Table:
     """Peaks of every joint, and its components that are statically indeterminate."""
     rows = []
     for i, joint in enumerate(found.joints):
-        peaks = [*_peak(time, found.force[:, i]), *_peak(time, found.torque[:, i])]
+        peaks = [*_peak(found.time, found.force[:, i]), *_peak(found.time, found.torque[:, i])]
         left = [name for name, out in zip(COMPONENTS, found.undetermined[i], strict=True) if out]
         rows.append((joint.name, joint.kind, " and ".join(joint.links), *peaks, ", ".join(left) or "none"))
     headers = ("peak |F| / N>", "at / s>", "peak |T| / N m>", "at / s>", "left open by balance")

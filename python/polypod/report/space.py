@@ -18,7 +18,7 @@ from polypod.workspace_plot import face_labels
 Array = NDArray[np.float64]
 
 _MM = 1e3
-_CAMERA = {"eye": {"x": 1.2, "y": -1.75, "z": 0.85}, "center": {"x": 0, "y": 0, "z": -0.12}}
+_CAMERA = {"eye": {"x": 1.05, "y": -1.55, "z": 0.75}, "center": {"x": 0, "y": 0, "z": -0.14}}
 _LIGHTING = {"ambient": 0.55, "diffuse": 0.6, "specular": 0.08, "roughness": 0.9, "fresnel": 0.0}
 _AXES = {"x": "$X_o$ / mm", "y": "$Y_o$ / mm", "z": "$Z_o$ / mm"}
 
@@ -68,7 +68,6 @@ def _boundary(workspace: Workspace) -> list[go.Mesh3d]:
                 name=_escaped(name),
                 showlegend=True,
                 flatshading=False,
-                opacity=0.55,
                 lighting=_LIGHTING,
                 lightposition={"x": -4000, "y": -6000, "z": 9000},
                 hovertemplate="%{x:.0f}, %{y:.0f}, %{z:.0f} mm<extra>" + _escaped(name) + "</extra>",

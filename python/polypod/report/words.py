@@ -17,8 +17,8 @@ def warnings(content: Content) -> list[str]:
     facts = content.along.facts
     found += [_sentence(warning) for warning in facts["singularities"]["warnings"]]
     found += [
-        f"Limit passed: {row['limit']}, by {row['states']} of {facts['states']} states, by "
-        f"{readable(-row['margin'], row['unit'])} at most, at {row['time']:g} s."
+        f"Limit passed: {row['limit']} at {row['states']} of {facts['states']} states, first at "
+        f"{row['first_time']:g} s, by {readable(-row['margin'], row['unit'])} at most, at {row['time']:g} s."
         for row in (facts["limits"] or {"passed": []})["passed"]
     ]
     return found + lost(facts)
