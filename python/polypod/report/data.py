@@ -37,8 +37,7 @@ def _rods(spec: dict[str, Any]) -> Table:
 
 
 def _links(mech: Mechanism, spec: dict[str, Any]) -> Table:
-    bodies = [("platform", spec["platform"])]
-    bodies += [(f"rod {rod['name']}", rod["body"]) for rod in spec["rods"]]
+    bodies = [("platform", spec["platform"]), *((f"rod {rod['name']}", rod["body"]) for rod in spec["rods"])]
     for name, leg in zip(mech.leg_names, spec["legs"], strict=True):
         bodies += [(f"{part} {name}", leg[part]) for part in ("cylinder", "piston")]
     rows = [
@@ -49,6 +48,7 @@ def _links(mech: Mechanism, spec: dict[str, Any]) -> Table:
             *(f"{body['inertia'][i][j]:.4g}" for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))),
         )
         for name, body in bodies
+        if body is not None
     ]
     inertia = tuple(f"I_{axes}>" for axes in ("xx", "yy", "zz", "xy", "xz", "yz"))
     headers = ("link", "mass / kg>", "mass centre / mm", *inertia)
