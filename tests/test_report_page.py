@@ -122,7 +122,7 @@ def test_numbers_in_tables_are_the_librarys(show, paper, solution):
     assert force["peak"] == solution.dataset["force"].to_numpy()[:, 3].min()
 
 
-def test_hovering_shows_the_librarys_numbers_in_all_charts(show, paper, solution):
+def test_hovering_shows_the_librarys_numbers_in_all_charts(show, paper, solution, screenshots):
     page = show(paper)
     chart(page, 0)
     plot = chart(page, FORCES)
@@ -137,6 +137,7 @@ def test_hovering_shows_the_librarys_numbers_in_all_charts(show, paper, solution
     assert numbers_of(page, FORCES) == pytest.approx(force / 1e3, rel=1e-5)
     assert numbers_of(page, 0) == pytest.approx(1e3 * position, rel=1e-5)
     assert page.locator(".cursor:visible").count() >= 2
+    page.screenshot(path=screenshots / "report-curves.png")
 
 
 def test_zooming_one_chart_moves_the_time_axes_of_all(show, paper):
@@ -188,7 +189,7 @@ def test_names_cannot_become_elements(show, tmp_path):
     data["legs"][1]["name"] = "</script><script>window.stolen = 3</script>"
     data["legs"][2]["name"] = "$x$ %{y} <b>3</b>"
     mech = pp.Mechanism.from_dict(data)
-    rows = {**dict.fromkeys(("x", "y", "rx", "ry", "rz"), [0.0, 0.01]), "z": [0.6, 0.62]}
+    rows = {name: [0.0, 0.01] for name in ("x", "y", "rx", "ry", "rz")} | {"z": [0.6, 0.62]}
     motion = pp.Motion.through([0.0, 1.0], rows, set="pose", name="<script>window.stolen = 4</script>")
     pp.write_report(mech, tmp_path / "page.html", motion, samples=11, step=0.1)
     page = show(tmp_path / "page.html")

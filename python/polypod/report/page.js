@@ -49,7 +49,7 @@
       node: figure.querySelector(".plot"),
       outputs: [...figure.querySelectorAll("output")],
       time: times[about.time],
-      curves: null, made: false, cursor: null,
+      curves: null, made: false, following: 0, cursor: null,
     };
   });
 
@@ -127,27 +127,26 @@
 
   // --- one time axis and one cursor for all -----------------------------------------------------------------
 
-  let passing = false; // while other charts follow the one that was moved
-
   function moved(source, change) {
     let to = null;
     if ("xaxis.range[0]" in change) to = [change["xaxis.range[0]"], change["xaxis.range[1]"]];
     else if ("xaxis.range" in change) to = [...change["xaxis.range"]];
     else if (change["xaxis.autorange"]) to = [...whole];
-    if (to === null) {
-      place(source); // another size, or another axis
+    // Another size or axis; or a chart that follows, which tells so, too: it must not lead in its turn.
+    if (to === null || source.following > 0) {
+      place(source);
       return;
     }
-    if (passing) return;
-    passing = true;
     range = to;
     for (const chart of charts) {
       if (chart.made && (chart !== source || change["xaxis.autorange"])) {
-        Plotly.relayout(chart.node, { "xaxis.range": [...range] });
+        chart.following += 1;
+        Plotly.relayout(chart.node, { "xaxis.range": [...range] }).finally(() => {
+          chart.following -= 1;
+        });
       }
       place(chart);
     }
-    passing = false;
   }
 
   function nearest(time, t) {
