@@ -14,9 +14,13 @@
   const MARGIN = { l: 66, r: 10, t: 8, b: 40 };
   const PRINTED = { width: 342, height: 205 };
   const FONT = 'system-ui, -apple-system, "Segoe UI", "Noto Sans", "DejaVu Sans", sans-serif';
+  // Named one by one, because some that are there by default lead to a service elsewhere.
   const CONFIG = {
     displaylogo: false, responsive: true,
-    modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d"],
+    modeBarButtons: [["zoom2d", "pan2d", "zoomIn2d", "zoomOut2d", "resetScale2d"], ["toImage"]],
+  };
+  const CONFIG_3D = {
+    ...CONFIG, modeBarButtons: [["orbitRotation", "pan3d", "zoom3d", "resetCameraDefault3d"], ["toImage"]],
   };
 
   const darkness = window.matchMedia("(prefers-color-scheme: dark)");
@@ -123,7 +127,7 @@
     }
   }
 
-  const visible = (chart) => chart.node.offsetParent !== null;
+  const visible = (chart) => chart.node.closest("details:not([open])") === null;
 
   // --- one time axis and one cursor for all -----------------------------------------------------------------
 
@@ -160,7 +164,7 @@
   }
 
   const readable = (value) =>
-    Number.isFinite(value) ? String(Number(value.toPrecision(6))).replace("-", "−") : "none";
+    Number.isFinite(value) ? String(Number(value.toPrecision(5))).replace("-", "−") : "none";
 
   function point(t) {
     now = t;
@@ -215,11 +219,15 @@
     );
   }
 
+  function redrawSpace() {
+    Plotly.react(space, spaceTraces(), spaceLayout(), CONFIG_3D);
+  }
+
   function makeSpace() {
     if (figure !== null) return;
     figure = JSON.parse(document.getElementById("figure").textContent);
-    Plotly.newPlot(space, spaceTraces(), spaceLayout(), { displaylogo: false, responsive: true });
-    through.addEventListener("change", () => Plotly.react(space, spaceTraces(), spaceLayout()));
+    Plotly.newPlot(space, spaceTraces(), spaceLayout(), CONFIG_3D);
+    through.addEventListener("change", redrawSpace);
   }
 
   // --- when -------------------------------------------------------------------------------------------------
@@ -240,7 +248,7 @@
 
   darkness.addEventListener("change", () => {
     redraw();
-    if (figure !== null) Plotly.react(space, spaceTraces(), spaceLayout());
+    if (figure !== null) redrawSpace();
   });
   window.addEventListener("beforeprint", () => {
     printing = true;
