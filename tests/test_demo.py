@@ -32,7 +32,7 @@ def test_all_files_are_there(demo):
             "topology.png",
             "topology.svg",
         ),
-        *("solution.nc", "solution.csv", "summary.md"),
+        *("solution.nc", "solution.csv", "summary.md", "report.html"),
     }
 
 
