@@ -32,7 +32,7 @@ def test_all_files_are_there(demo):
             "topology.png",
             "topology.svg",
         ),
-        *("solution.nc", "solution.csv", "summary.md"),
+        *("solution.nc", "solution.csv", "summary.md", "report.html"),
     }
 
 
@@ -85,7 +85,7 @@ def test_summary_tells_measured_numbers(demo):
         "polypod info",
     ):
         assert text in demo.text
-    for name in ("fig4.png", "poses.png", "topology.png", "solution.nc", "solution.csv"):
+    for name in ("report.html", "fig4.png", "poses.png", "topology.png", "solution.nc", "solution.csv"):
         assert name in demo.text
 
 
@@ -97,12 +97,12 @@ def test_the_motion_is_compared_with_another_engine(demo):
 
 
 def test_without_the_engine_the_summary_says_what_to_install(monkeypatch):
-    from polypod import demo as module
+    from polypod.paper_tables import table_iii_markdown
     from polypod.verify import table
 
     monkeypatch.setattr(table, "find_spec", lambda module: None)
     mech = pp.load(EXAMPLE)
-    assert "pip install polypod[verify]" in module._table_iii(mech, pp.load_motion(EXAMPLE, mech))
+    assert "pip install polypod[verify]" in table_iii_markdown(mech, pp.load_motion(EXAMPLE, mech), EXAMPLE)
 
 
 def test_a_second_run_gives_the_same_files(demo, tmp_path):

@@ -31,6 +31,7 @@ from polypod.status import Status
 if TYPE_CHECKING:
     from polypod.control import ComputedTorque
     from polypod.motion import Motion, load_motion
+    from polypod.report import report_html, write_report
     from polypod.results import Solution, load_solution
     from polypod.solution import solve
     from polypod.workspace import Workspace, load_workspace
@@ -48,6 +49,8 @@ _LATER = {
     "Workspace": "workspace",
     "load_workspace": "workspace",
     "plots": "plots",
+    "report_html": "report",
+    "write_report": "report",
 }
 
 __all__ = [
@@ -77,7 +80,9 @@ __all__ = [
     "load_motion",
     "load_solution",
     "load_workspace",
+    "report_html",
     "solve",
+    "write_report",
 ]
 
 

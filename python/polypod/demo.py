@@ -12,22 +12,19 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from polypod import plots
-from polypod.errors import MissingEngineError
-from polypod.mechanism import Mechanism, load
-from polypod.motion import Motion, load_motion
-from polypod.paper import fit_markdown, fit_table_i, table_i
+from polypod.mechanism import load
+from polypod.motion import load_motion
+from polypod.paper import MECHANISM
+from polypod.paper_tables import TABLE_II, section4_markdown, table_i_markdown, table_iii_markdown
+from polypod.report.content import gather
+from polypod.report.page import render, save
 from polypod.results import Solution
-from polypod.section4 import Section4, as_markdown, section4
+from polypod.section4 import section4
 from polypod.solution import solve
 from polypod.summary import describe, summarise
-from polypod.verify import verify
-from polypod.verify.report import as_markdown as verification_markdown
 
-EXAMPLE = "lu-3spu-2rpu-r"
+EXAMPLE = MECHANISM
 """Built-in mechanism, and the motion of the same name."""
-
-COMPARED = 81
-"""States of the motion that are compared with another engine."""
 
 
 @dataclass(frozen=True)
@@ -78,10 +75,16 @@ def run_demo(directory: str | PathLike[str]) -> Demo:
     for suffix in (".png", ".svg"):
         plots.save_figure(views, directory / f"fig3{suffix}")
         files.append(f"fig3{suffix}")
-    text = _summary(facts, path, _table_i(mech)) + _workspace_summary(found)
-    text += _table_iii(mech, motion)
+    first, third = table_i_markdown(mech), table_iii_markdown(mech, motion, EXAMPLE)
+    text = _summary(facts, path, f"## Table I\n\n{first}")
+    text += f"\n## Workspace of Section 4\n\n{section4_markdown(found, '`fig3.png`')}"
+    text += f"\n## Table III\n\n{third}"
     (directory / "summary.md").write_text(text, encoding="utf-8")
-    return Demo(directory, (*files, "summary.md"), facts, path, text)
+    section = section4_markdown(found, "The figure under [Workspace](#workspace)")
+    paper = [("Table I", first), ("Table II", TABLE_II), ("Table III", third), ("Section 4", section)]
+    content = gather(mech, EXAMPLE, workspace=found.flood, paper=paper)
+    save(render(content, "polypod demo"), directory / "report.html")
+    return Demo(directory, (*files, "report.html", "summary.md"), facts, path, text)
 
 
 def _notable_poses(solution: Solution) -> dict[str, NDArray[np.float64]]:
@@ -152,65 +155,12 @@ curves are in a figure without numbers; this motion is Polypod's.
 
 ## What to look at next
 
+- `report.html`: all of it as one page, with curves to zoom, actuators, reactions, singularities, workspace
 - `fig3.png`: Fig. 3; `fig4.png`: the panels of Fig. 4; `poses.png`: Fig. 1a, c-e; `topology.png`: Fig. 1b;
   all as SVG, too
 - `solution.nc`, `solution.csv`: every quantity with its unit; `polypod.load_solution` reads both
 - `polypod info {facts["name"]}`: freedoms, constraints, conditioning, warnings
 - `polypod solve {facts["name"]} your-motion.csv -o result.nc`: your own motion
-"""
-
-
-def _table_i(mech: Mechanism) -> str:
-    """The part of summary.md on Table I; every number is measured."""
-    first, fit = table_i(mech), fit_table_i(mech)
-    fitted = fit.orientations
-    e, on_rod, other = 1e3 * fit.radii
-    rms, largest = np.degrees([first.rms, fitted.rms]), np.degrees([first.largest, fitted.largest])
-    skew = 1e3 * abs(first.lengths[0, 0] - first.lengths[0, 2])
-    return f"""## Table I
-
-Of up to {first.modes.number.max()} assembly modes in each row, the one above the base nearest to the print.
-
-{fit_markdown(first, fit)}
-
-- With Table II the 18 angles differ by {rms[0]:.2f}° rms, {largest[0]:.2f}° at most.
-- Fitted: e = {e:.1f}, E_1 = {on_rod:.1f}, E_2 = {other:.1f} mm; then {rms[1]:.2f}° rms,
-  {largest[1]:.2f}° at most.
-- Row 1 is not symmetric, r_1 and r_3 differ by {skew:.2f} mm; yet φ_zX = 90° is printed.
-"""
-
-
-def _workspace_summary(found: Section4) -> str:
-    facts = found.facts()
-    flood = facts["flood"]
-    share = 100 * flood["volume_error"] / flood["volume"]
-    return f"""
-## Workspace of Section 4
-
-{as_markdown(facts)}
-
-`fig3.png` shows the first, coloured by what ends it. Its volume is
-{flood["volume"]:.3f} m³, give or take {share:.1g} %. The paper steps the lengths by 10 mm; that takes longer.
-"""
-
-
-def _table_iii(mech: Mechanism, motion: Motion) -> str:
-    """The part of summary.md on Table III; every number is measured."""
-    start, end = motion.time[0], motion.time[-1]
-    try:
-        facts = verify(mech, motion.sample(np.linspace(start, end, COMPARED))).facts()
-    except MissingEngineError as error:
-        return f"""
-## Table III
-
-Not compared with another engine: {error}
-"""
-    return f"""
-## Table III
-
-Errors at {COMPARED} instants of the motion; `polypod verify {mech.name} {EXAMPLE}` compares at all.
-
-{verification_markdown(facts)}
 """
 
 

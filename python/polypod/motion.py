@@ -278,6 +278,11 @@ def load_motion(
     return replace(motion, branch=branch or motion.branch, wrench_axes=wrench_axes or motion.wrench_axes)
 
 
+def motion_text(source: str | PathLike[str]) -> str:
+    """The text of such a file or built-in motion."""
+    return _find(source).read_text(encoding="utf-8-sig")
+
+
 def motion_names() -> list[str]:
     """Names of the built-in motions."""
     return sorted(_built_in())

@@ -15,6 +15,9 @@ from polypod.errors import UnsupportedError
 from polypod.mechanism import Mechanism
 from polypod.units import cos_sin, to_si
 
+MECHANISM = "lu-3spu-2rpu-r"
+"""The built-in mechanism that is the paper's."""
+
 TABLE_I: tuple[tuple[float, ...], ...] = (
     (708.14, 650.00, 715.46, 850.00, 850.00, 90.00, 27.17, 62.86),
     (769.10, 850.00, 769.10, 650.00, 650.00, 90.00, 136.94, 46.94),

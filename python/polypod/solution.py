@@ -62,7 +62,8 @@ def solve(
         parts.append(part | _solve_reactions(mech, motion, state, chunk) if reactions else part)
         if progress is not None:
             progress(chunk.stop, total)
-    values = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+    # Each part goes when its whole is there: long motions need their memory once, not twice.
+    values = {name: np.concatenate([part.pop(name) for part in parts]) for name in [*parts[0]]}
     values["actuator_work"] = work_of(motion.time, values["actuator_power"])
     determinant = Determinant(
         mech,

@@ -22,6 +22,7 @@ COMMANDS = (
     "verify",
     "view",
     "export",
+    "report",
 )
 
 app = typer.Typer(

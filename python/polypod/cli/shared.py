@@ -17,6 +17,11 @@ from rich.text import Text
 if TYPE_CHECKING:
     from polypod.mechanism import Mechanism
 
+from polypod.tables import Table as Words
+from polypod.tables import fixed as fixed
+from polypod.tables import range_mm as range_mm
+from polypod.tables import significant as significant
+
 MechanismArgument = Annotated[
     str, typer.Argument(metavar="MECHANISM", help="A mechanism file (.toml) or a built-in mechanism's name.")
 ]
@@ -86,20 +91,14 @@ def _plain(header: str) -> str:
     return header.removesuffix(">")
 
 
-def range_mm(limits: list[float | None]) -> str:
-    """Least and greatest of lengths in m, written in mm."""
-    low, high = (fixed(value, 1e3) for value in limits)
-    return "free" if limits == [None, None] else f"{low} to {high}"
-
-
-def fixed(value: float | None, scale: float = 1.0) -> str:
-    """One decimal, as readings have."""
-    return "none" if value is None else f"{scale * value:.1f}"
-
-
-def significant(value: float | None, digits: int = 3) -> str:
-    """A number whose size is not known beforehand."""
-    return "none" if value is None else f"{value:.{digits}g}"
+def print_words(out: Console, words: Words) -> None:
+    """A table of texts, and the sentence below it."""
+    table = new_table(escape(words.title), *words.headers)
+    for row in words.rows:
+        table.add_row(*map(escape, row))
+    out.print(table)
+    if words.note:
+        out.print(escape(words.note))
 
 
 def print_json(data: Any) -> None:

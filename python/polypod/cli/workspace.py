@@ -16,6 +16,7 @@ from polypod.cli.shared import (
     console,
     new_table,
     print_json,
+    print_words,
     print_written,
     progress_bar,
 )
@@ -176,6 +177,7 @@ def _check_workspace_options(
 
 
 def _print_workspace(out: Console, facts: dict[str, Any]) -> None:
+    from polypod.tables import ends_table, extents_table
     from polypod.units import coordinate_unit, readable
 
     fixed = ", ".join(
@@ -189,19 +191,8 @@ def _print_workspace(out: Console, facts: dict[str, Any]) -> None:
         f"{facts['inside']} of {facts['nodes']} nodes",
         highlight=False,
     )
-    table = new_table("Extents", "", "least>", "greatest>", "width>", "step>")
-    for name, (low, high) in facts["extents"].items():
-        values = (low, high, high - low, facts["step"][name])
-        table.add_row(name, *(readable(value, coordinate_unit(name)) for value in values))
-    out.print(table)
-    word = "volume" if len(facts["extents"]) == 3 else "area"
-    out.print(
-        f"{word}: {facts['volume']:.5g} ± {facts['volume_error']:.1g} {facts['volume_unit']}", highlight=False
-    )
-    ends = new_table("What ends it", "", "part of the boundary>")
-    for name, share in facts["boundary"].items():
-        ends.add_row(escape(name), f"{100 * share:.1f} %")
-    out.print(ends)
+    print_words(out, extents_table(facts))
+    print_words(out, ends_table(facts))
 
 
 def _print_lattice(out: Console, facts: dict[str, Any]) -> None:

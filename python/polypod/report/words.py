@@ -1,0 +1,108 @@
+"""What a report says in words, and at a glance."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from polypod.report.content import Along, Content
+from polypod.tables import Table, fixed, outcome, range_mm, significant
+from polypod.units import readable
+
+
+def warnings(content: Content) -> list[str]:
+    """Whatever a reader should know first: of the mechanism, of its motion, of limits and of lost states."""
+    found = [_sentence(warning) for warning in content.facts["warnings"]]
+    if content.along is None:
+        return found
+    facts = content.along.facts
+    found += [_sentence(warning) for warning in facts["singularities"]["warnings"]]
+    found += [
+        f"Limit passed: {row['limit']} at {row['states']} of {facts['states']} states, first at "
+        f"{row['first_time']:g} s, by {readable(-row['margin'], row['unit'])} at most, at {row['time']:g} s."
+        for row in (facts["limits"] or {"passed": []})["passed"]
+    ]
+    return found + lost(facts)
+
+
+def lost(facts: dict[str, Any]) -> list[str]:
+    """A sentence for each outcome other than OK."""
+    return [
+        f"{row['count']} of {facts['states']} states are {row['status']}, first at {row['first_time']:g} s: "
+        f"{row['message']}."
+        for row in facts["outcomes"]
+    ]
+
+
+def outcomes(facts: dict[str, Any]) -> str:
+    """What became of all states, in one sentence."""
+    if not facts["outcomes"]:
+        return outcome(facts)
+    without, states = facts["without_answer"], facts["states"]
+    if not without:
+        return "All states have an answer, but not all are without reservation."
+    return f"{without} of {states} states have no answer; curves have gaps there, and the gaps are grey."
+
+
+def glance(content: Content) -> list[tuple[str, str]]:
+    """The few facts that come first: name and value."""
+    facts, mobility = content.facts, content.facts["mobility"]
+    found = [
+        ("freedoms", str(mobility["dof"])),
+        ("legs", "+".join(leg["joints"] for leg in facts["legs"])),
+        ("redundant constraints", str(mobility["redundant"])),
+    ]
+    if content.along is not None:
+        found += _of_motion(content.along)
+    if content.workspace is not None:
+        volume = content.workspace
+        found.append(("workspace", f"{volume.volume:.3g} {volume.volume_unit}".replace("^3", "³")))
+    return found
+
+
+def _of_motion(along: Along) -> list[tuple[str, str]]:
+    facts = along.facts
+    peaks = [row["force"] for row in along.actuators if row["force"]["peak"] is not None]
+    powers = [row["power"] for row in along.actuators if row["power"]["peak"] is not None]
+    found = [("motion", f"{facts['end'] - facts['start']:g} s, {facts['states']} states")]
+    for name, rows, unit in (("peak force", peaks, "N"), ("peak power of an actuator", powers, "W")):
+        if rows:
+            found.append((name, f"{max(abs(row['peak']) for row in rows):.0f} {unit}"))
+    if nearest := facts["nearest_to_singular"]:
+        found.append(("smallest singular value", significant(nearest["sigma_min"])))
+    if facts["without_answer"]:
+        found.append(("states without an answer", str(facts["without_answer"])))
+    return found
+
+
+def actuators_table(rows: list[dict[str, Any]]) -> Table:
+    """What the motion asks of each actuator."""
+    cells = []
+    for row in rows:
+        force, speed, power, stroke = (row[key] for key in ("force", "speed", "power", "stroke"))
+        cells.append(
+            (
+                row["leg"],
+                fixed(force["peak"]),
+                fixed(force["rms"]),
+                fixed(speed["peak"], 1e3),
+                fixed(speed["rms"], 1e3),
+                fixed(power["peak"]),
+                fixed(power["rms"]),
+                range_mm([stroke["least"], stroke["greatest"]]) if stroke["used"] is not None else "none",
+                fixed(stroke["used"], 1e3),
+                "" if stroke["share"] is None else f"{100 * stroke['share']:.1f} %",
+            )
+        )
+    headers = (
+        *("leg", "peak force / N>", "rms / N>", "peak speed / mm/s>", "rms / mm/s>", "peak power / W>"),
+        *("rms / W>", "length / mm>", "stroke used / mm>", "of the stroke>"),
+    )
+    note = (
+        "Peaks are the values of largest size, with their signs: forces are positive when they push the "
+        "platform away, speeds when the leg becomes longer, powers when the actuator drives."
+    )
+    return Table("Actuators", headers, cells, note)
+
+
+def _sentence(text: str) -> str:
+    return text[:1].upper() + text[1:]
