@@ -597,7 +597,7 @@ def test_batches_and_broadcasting():
     assert whole.axes.shape == (n, j, 3, 3)
     for k in (0, 5, n - 1):
         one = c.mech.joint_reactions(c.T[k], c.twist[k], c.acceleration[k])
-        for name in one._fields[1:]:
+        for name in one.arrays:
             assert np.array_equal(getattr(one, name), getattr(whole, name)[k], equal_nan=True), name
     grid = c.mech.joint_reactions(c.T[2], REST, REST, np.zeros((2, 1, 6)) + np.eye(6)[:3])
     assert grid.reactions.shape == (2, 3, j, 6)

@@ -26,7 +26,7 @@ def everything(mech: pp.Mechanism, pose: np.ndarray) -> dict[str, tuple[int, boo
         "power": mech.power(pose, REST, REST),
         "conditioning": mech.conditioning(pose),
     }
-    return {name: (int(a.status), bool(np.isfinite(a[0]).all())) for name, a in answers.items()}
+    return {name: (int(a.status), bool(np.isfinite(next(iter(a))).all())) for name, a in answers.items()}
 
 
 def with_end_at(mech: pp.Mechanism, leg: int, point: np.ndarray) -> np.ndarray:

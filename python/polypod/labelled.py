@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
@@ -88,6 +88,10 @@ class Answer:
     def arrays(self) -> dict[str, NDArray[Any]]:
         """Its arrays by name."""
         return {name: getattr(self, name) for name in self._variables}
+
+    def __iter__(self) -> Iterator[NDArray[Any]]:
+        """Its arrays, in order: an answer can be unpacked."""
+        return iter(self.arrays.values())
 
     def labels(self) -> dict[str, Sequence[Any]]:
         """Names along dimensions that only this answer knows."""

@@ -17,26 +17,16 @@ pub(crate) type Poses = [Row; 12];
 /// Lengths of the actuated legs, and a guess.
 pub type Asked = (Vec<f64>, Pose<f64>);
 
-/// The squared lengths of at most [`WIDTH`] states, one in each lane.
-pub(crate) fn squares_of(states: &[Asked]) -> [Row; 6] {
-    let mut rows = [[0.0; WIDTH]; 6];
-    for (k, (lengths, _)) in states.iter().enumerate() {
-        for (row, square) in rows.iter_mut().zip(squares(lengths)) {
-            row[k] = square;
-        }
-    }
-    rows
-}
-
 /// [`forward_kinematics`](crate::forward::forward_kinematics) of at most [`WIDTH`] states, each as if it were alone.
 ///
 /// # Panics
 /// If there are more.
 #[must_use]
 pub fn forward_kinematics_of(mech: &Mechanism, states: &[Asked]) -> Vec<Found> {
-    let (mut poses, to) = ([[0.0; WIDTH]; 12], squares_of(states));
-    for (k, (_, guess)) in states.iter().enumerate() {
+    let (mut poses, mut to) = ([[0.0; WIDTH]; 12], [[0.0; WIDTH]; 6]);
+    for (k, (lengths, guess)) in states.iter().enumerate() {
         put(&mut poses, k, guess);
+        put_squares(&mut to, k, lengths);
     }
     let mut lanes: Vec<Lane> = states.iter().map(|(lengths, _)| Lane::new(lengths)).collect();
     let mut at = Newtons::default();
@@ -237,8 +227,15 @@ pub(crate) fn newton<V: Lanes>(mech: &Mechanism, pose: &Pose<V>, squares: &[Row;
     Newton { next, size: sum.sqrt(), residual: largest, pivots, sign }
 }
 
+/// The squared lengths of a state.
+pub(crate) fn put_squares(rows: &mut [Row; 6], k: usize, lengths: &[f64]) {
+    for (row, square) in rows.iter_mut().zip(squares(lengths)) {
+        row[k] = square;
+    }
+}
+
 #[inline(always)]
-fn load_squares<V: Lanes>(squares: &[Row; 6], k: usize) -> [V; 6] {
+pub(crate) fn load_squares<V: Lanes>(squares: &[Row; 6], k: usize) -> [V; 6] {
     let mut loaded = [V::zero(); 6];
     for i in 0..6 {
         loaded[i] = V::load(&squares[i][k..]);

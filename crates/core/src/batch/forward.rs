@@ -4,7 +4,7 @@ use super::Table;
 use super::block::{self, Codes, Pieces, Rows};
 use super::checks::{actuated_values, is_rotation, joint_limits, raw_pose, then, with_legs};
 use crate::forward::{self, Found};
-use crate::forward_lanes::{Poses, forward_kinematics_of, load, put};
+use crate::forward_lanes::{Poses, forward_kinematics_of, load, load_squares, put, put_squares};
 use crate::lanes::{self, Lanes, Row, Task, WIDTH};
 use crate::limits::Seen;
 use crate::mechanism::Mechanism;
@@ -46,7 +46,8 @@ pub fn forward_kinematics(
                 }
                 if states.len() == WIDTH || i + 1 == last {
                     let found = forward_kinematics_of(mech, &states);
-                    let checked = checks(mech, found.iter().map(|f| (&f.pose, f.residual)));
+                    let asked = states.iter().map(|(asked, _)| &asked[..]);
+                    let checked = checks(mech, asked.zip(found.iter().map(|f| &f.pose)));
                     for ((i, found), check) in numbers.drain(..).zip(&found).zip(checked) {
                         put_found(rows, i, found, then(found.status, || block::read(check).0));
                     }
@@ -68,7 +69,7 @@ pub fn forward_kinematics(
             if let (Some(last), Some(before), Status::Ok) = (last, before, found.status) {
                 found = forward::passed(mech, &values, &before, &last, &found).unwrap_or(found);
             }
-            let status = then(found.status, || check_found(mech, &found.pose, found.residual));
+            let status = then(found.status, || check_found(mech, &values, &found.pose));
             put_found(rows, i, &found, status);
             let unsolved = [Status::NotConverged, Status::InvalidInput, Status::Singular, Status::ModeJump]
                 .contains(&status);
@@ -94,44 +95,44 @@ fn put_found(rows: &mut Rows<'_, 3>, i: usize, found: &Found, status: Status) {
     rows.set(counts, i, 0, &[f64::from(iterations)]);
 }
 
-/// Whether a pose that was found is one that the mechanism can be in, and within its limits.
-fn check_found(mech: &Mechanism, pose: &Pose<f64>, residual: f64) -> Status {
-    block::read(checks(mech, [(pose, residual)])[0]).0
+/// Whether a pose that was found for lengths is one that the mechanism can be in, and within its limits.
+fn check_found(mech: &Mechanism, asked: &[f64], pose: &Pose<f64>) -> Status {
+    block::read(checks(mech, [(asked, pose)])[0]).0
 }
 
-/// The same of at most [`WIDTH`] poses with their residuals, as codes.
-fn checks<'a>(mech: &Mechanism, found: impl IntoIterator<Item = (&'a Pose<f64>, f64)>) -> Row {
-    let (mut poses, mut residuals, mut codes) = ([[0.0; WIDTH]; 12], [0.0; WIDTH], [0.0; WIDTH]);
-    for (k, (pose, residual)) in found.into_iter().enumerate() {
+/// The same of at most [`WIDTH`] lengths and poses, as codes.
+fn checks<'a>(mech: &Mechanism, found: impl IntoIterator<Item = (&'a [f64], &'a Pose<f64>)>) -> Row {
+    let (mut poses, mut to, mut codes) = ([[0.0; WIDTH]; 12], [[0.0; WIDTH]; 6], [0.0; WIDTH]);
+    for (k, (asked, pose)) in found.into_iter().enumerate() {
         put(&mut poses, k, pose);
-        residuals[k] = residual;
+        put_squares(&mut to, k, asked);
     }
-    lanes::dispatch(Checks { mech, poses: &poses, residuals: &residuals, codes: &mut codes });
+    lanes::dispatch(Checks { mech, poses: &poses, squares: &to, codes: &mut codes });
     codes
 }
 
 struct Checks<'a> {
     mech: &'a Mechanism,
     poses: &'a Poses,
-    residuals: &'a Row,
+    squares: &'a [Row; 6],
     codes: &'a mut Row,
 }
 
 impl Task for Checks<'_> {
     /// A root that a constraint has only because a leg has no frame there is none. Strokes are judged by the lengths
-    /// that were asked for, which the pose's own miss by the residual: lengths at the very end of a stroke are within
-    /// it.
+    /// that were asked for, which the pose's own miss by its error: lengths at the very end of a stroke are within it.
     #[inline(always)]
     fn run<V: Lanes>(self) {
         let (mech, mut k) = (self.mech, 0);
         while k < WIDTH {
-            let (pose, residual) = (load::<V>(self.poses, k), V::load(&self.residuals[k..]));
+            let pose = load::<V>(self.poses, k);
+            let missed = forward::error(mech, &load_squares(self.squares, k), &pose);
             let mut codes = with_legs(mech, &pose, Codes::ok());
             let mut seen = Seen::default();
             for limit in joint_limits(mech) {
                 let mut margin = limit.bound.margin(limit.of_joint(mech, &pose, &mut seen));
                 if limit.status() == Status::OutOfStroke {
-                    margin = margin + residual;
+                    margin = margin + missed;
                 }
                 codes = codes.unless(V::zero().at_most(margin), limit.status());
             }
@@ -154,21 +155,23 @@ pub struct AllModes {
 #[must_use]
 pub fn assembly_modes(mech: &Mechanism, start: &Start, lengths: &[f64]) -> AllModes {
     let n = lengths.len() / mech.legs.len();
-    let found = block::each(n, |i| modes::assembly_modes(mech, start, &actuated_values(mech, lengths, i)));
-    let all: Vec<&modes::Mode> = found.iter().flat_map(|f| &f.modes).collect();
+    let asked = |i: usize| actuated_values(mech, lengths, i);
+    let found = block::each(n, |i| modes::assembly_modes(mech, start, &asked(i)));
+    let all: Vec<(usize, &modes::Mode)> =
+        found.iter().enumerate().flat_map(|(i, f)| f.modes.iter().map(move |mode| (i, mode))).collect();
     let [sign, above, multiplicity, residual] =
         ["determinant_sign", "above", "multiplicity", "residual"].map(|name| (name, vec![]));
     let fields = [("pose", vec![4, 4]), sign, above, multiplicity, residual];
     let [poses, sign, above, multiplicity, residual] = block::fields();
     let table = block::one_by_one(all.len(), fields, Pieces::QUICK, |rows, i| {
-        let mode = all[i];
+        let (set, mode) = all[i];
         rows.set(poses, i, 0, &mode.pose.matrix());
         rows.set(sign, i, 0, &[if mode.singular { 0.0 } else { mode.sign }]);
         rows.set(above, i, 0, &[f64::from(u8::from(mode.above))]);
         rows.set(multiplicity, i, 0, &[f64::from(mode.multiplicity)]);
         rows.set(residual, i, 0, &[mode.residual]);
         let status = if mode.singular { Status::Singular } else { Status::Ok };
-        then(status, || check_found(mech, &mode.pose, mode.residual))
+        then(status, || check_found(mech, &asked(set), &mode.pose))
     });
     let counts = found.iter().map(|f| f.modes.len()).collect();
     AllModes { modes: table, counts, status: found.iter().map(|f| f.status).collect() }
