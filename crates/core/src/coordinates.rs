@@ -5,8 +5,8 @@
 //! place with trigonometry.
 
 use crate::constraint;
-use crate::lanes::{Lanes, any};
-use crate::linear::solve;
+use crate::lanes::{Lanes, Work, any};
+use crate::linear::{solve, solve_all};
 use crate::mechanism::{Constraint, ConstraintKind, MAX_CONSTRAINTS, Mechanism};
 use crate::mobility::count;
 use crate::real::{Constant, Dual, Jet, Mask, Ordered, Real, Scalar, Trig};
@@ -142,6 +142,22 @@ impl Set<Dual<f64>> {
 }
 
 impl Set {
+    /// The same for a mechanism that may vary, but does not.
+    pub(crate) fn lifted(&self) -> Set<Dual<f64>> {
+        let lifted = |plane: &Plane| Plane {
+            base: Mat3::lift(plane.base),
+            platform: Mat3::lift(plane.platform),
+            base_point: Vec3::lift(plane.base_point),
+            platform_point: Vec3::lift(plane.platform_point),
+        };
+        match self {
+            Set::Paper(plane) => Set::Paper(lifted(plane)),
+            Set::Natural(plane) => Set::Natural(lifted(plane)),
+            Set::Tool => Set::Tool,
+            Set::Pose => Set::Pose,
+        }
+    }
+
     /// The sets that a mechanism has.
     #[must_use]
     pub fn of(mech: &Mechanism) -> Vec<Set> {
@@ -455,45 +471,157 @@ pub fn along<V: Ordered>(mech: &Mechanism, set: &Set, platform: &Motion<V>) -> V
     set.values(mech, &platform.jets())
 }
 
-/// How well given coordinates determine the others: the pivot ratio of what does it, one where there are none.
-#[inline(always)]
-pub fn determined<V: Ordered>(mech: &Mechanism, set: &Set, q: &Values<Jet<V>>, given: &[bool]) -> V {
-    let dependent = Dependent::of(set, given);
-    if dependent.count == 0 {
-        return V::one();
-    }
-    solve(gradient(mech, set, q, &dependent), [V::zero(); MAX_CONSTRAINTS]).pivots
+/// How pose and constraints, with their rates and second rates, vary with one number of the set or of the geometry, the
+/// other numbers and all rates kept.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Variation<V> {
+    /// Columns of R, then o: values, rates, second rates.
+    pub pose: [[Vec3<V>; 4]; 3],
+    /// The independent constraints in pure numbers, likewise.
+    pub constraints: [System<V>; 3],
 }
 
-/// The motion with given coordinates that vary as duals; the others, whose values are known, follow so that the
-/// constraints are kept: by one Newton step in duals, which is exact from a solution on \[T56\].
-#[must_use]
-#[inline(always)]
-pub fn varied<S, V: Ordered>(
-    mech: &Mechanism<S>,
-    set: &Set<S>,
-    q: &Values<Jet<Dual<V>>>,
-    given: &[bool],
-) -> Motion<Dual<V>>
-where
-    S: Constant<Jet<Dual<V>>> + Constant<Dual<Dual<V>>>,
-{
-    let mut q = *q;
-    let dependent = Dependent::of(set, given);
-    if dependent.count > 0 {
-        let residual = residual(mech, &set.pose(mech, &q));
-        let mut rhs = [Dual::zero(); MAX_CONSTRAINTS];
-        for k in 0..MAX_CONSTRAINTS {
-            rhs[k] = -residual[k].x;
-        }
-        let step = solve(gradient(mech, set, &q, &dependent), rhs).x;
-        for (k, &i) in dependent.numbers().iter().enumerate() {
-            // The values are a solution within rounding: only their derivatives move.
-            q[i] = Jet::new(Dual::new(q[i].x.x, q[i].x.d + step[k].d), Dual::zero(), Dual::zero());
-        }
-        follow(mech, set, &mut q, &dependent);
+impl<V: Real> Variation<V> {
+    #[inline(always)]
+    fn none() -> Self {
+        Variation { pose: [[Vec3::zero(); 4]; 3], constraints: [[V::zero(); MAX_CONSTRAINTS]; 3] }
     }
-    motion(&set.pose(mech, &q))
+
+    /// With the number's rate (order 1) or second rate (order 2) instead: `∂x'/∂q' = ∂x/∂q`, `∂x''/∂q' = 2 ∂x'/∂q`,
+    /// `∂x''/∂q'' = ∂x/∂q`.
+    #[must_use]
+    #[inline(always)]
+    pub(crate) fn by_rate(&self, order: usize) -> Self {
+        let mut rates = Variation::none();
+        for from in 0..3 - order {
+            let share = if order == 1 && from == 1 { 2.0 } else { 1.0 };
+            for k in 0..4 {
+                rates.pose[from + order][k] = self.pose[from][k] * V::lit(share);
+            }
+            for k in 0..MAX_CONSTRAINTS {
+                rates.constraints[from + order][k] = self.constraints[from][k].scale(share);
+            }
+        }
+        rates
+    }
+
+    /// The sum with so much of another.
+    #[must_use]
+    #[inline(always)]
+    pub(crate) fn and(mut self, other: &Self, share: V) -> Self {
+        for order in 0..3 {
+            for k in 0..4 {
+                self.pose[order][k] = self.pose[order][k] + other.pose[order][k] * share;
+            }
+            for k in 0..MAX_CONSTRAINTS {
+                let sum = self.constraints[order][k];
+                self.constraints[order][k] = other.constraints[order][k].mul_add(share, sum);
+            }
+        }
+        self
+    }
+}
+
+/// What varies with a number of the set, or with one of the mechanism.
+pub(crate) struct Varying<'a, V> {
+    pub mech: &'a Mechanism<Dual<f64>>,
+    pub set: &'a Set<Dual<f64>>,
+    pub q: &'a Values<Jet<V>>,
+    /// The number of the set.
+    pub number: Option<usize>,
+}
+
+impl<V: Lanes> Work<V> for Varying<'_, V> {
+    type Result = Variation<V>;
+
+    #[inline(always)]
+    fn run(self) -> Variation<V> {
+        let mut q = [Jet::zero(); MAX_COORDINATES];
+        for k in 0..MAX_COORDINATES {
+            let (Jet { x, d, dd }, zero) = (self.q[k], V::zero());
+            q[k] = Jet::new(Dual::new(x, zero), Dual::new(d, zero), Dual::new(dd, zero));
+        }
+        if let Some(k) = self.number {
+            q[k].x.d = V::one();
+        }
+        let pose = self.set.pose(self.mech, &q);
+        let (values, mut all) = (residual(self.mech, &pose), Variation::none());
+        let [x, y, z] = pose.rotation.0;
+        let vectors = [x, y, z, pose.o];
+        for k in 0..4 {
+            let parts = parts(vectors[k]);
+            for order in 0..3 {
+                let Vec3 { x, y, z } = parts[order];
+                all.pose[order][k] = Vec3 { x: x.d, y: y.d, z: z.d };
+            }
+        }
+        for k in 0..MAX_CONSTRAINTS {
+            let Jet { x, d, dd } = values[k];
+            for (order, part) in [x, d, dd].into_iter().enumerate() {
+                all.constraints[order][k] = part.d;
+            }
+        }
+        all
+    }
+}
+
+/// How dependent coordinates, with their rates and second rates, follow whatever varies, so that the constraints are kept
+/// \[T56\].
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Following<V: Real> {
+    dependent: Dependent,
+    /// With each dependent number.
+    by: [Variation<V>; MAX_CONSTRAINTS],
+    /// The inverse of ∂g/∂y, column by column.
+    inverse: [System<V>; MAX_CONSTRAINTS],
+    /// Its pivot ratio, one where nothing depends.
+    pub pivots: V::Value,
+}
+
+impl<V: Lanes> Following<V> {
+    #[inline(always)]
+    pub(crate) fn at(
+        mech: &Mechanism<Dual<f64>>,
+        set: &Set<Dual<f64>>,
+        q: &Values<Jet<V>>,
+        given: &[bool; MAX_COORDINATES],
+    ) -> Self {
+        let dependent = Dependent::of(set, given);
+        let mut unit = [[V::zero(); MAX_CONSTRAINTS]; MAX_CONSTRAINTS];
+        for k in 0..MAX_CONSTRAINTS {
+            unit[k][k] = V::one();
+        }
+        let (mut matrix, mut by) = (unit, [Variation::none(); MAX_CONSTRAINTS]);
+        for (column, &i) in dependent.numbers().iter().enumerate() {
+            by[column] = V::apart(Varying { mech, set, q, number: Some(i) });
+            for row in 0..mech.independent.len() {
+                matrix[row][column] = by[column].constraints[0][row];
+            }
+        }
+        let solved = solve_all(matrix, unit);
+        let pivots = if dependent.count == 0 { V::one() } else { solved.pivots };
+        Following { dependent, by, inverse: solved.x, pivots }
+    }
+
+    /// What varies, with what follows: `G_y δy = -δg`, then the same of rates and second rates with what the former do to
+    /// them.
+    #[must_use]
+    #[inline(always)]
+    pub(crate) fn with(&self, mut all: Variation<V>) -> Variation<V> {
+        for order in 0..3 {
+            let mut step = [V::zero(); MAX_CONSTRAINTS];
+            for k in 0..MAX_CONSTRAINTS {
+                let off = all.constraints[order][k];
+                for i in 0..MAX_CONSTRAINTS {
+                    step[i] = (-self.inverse[k][i]).mul_add(off, step[i]);
+                }
+            }
+            for k in 0..self.dependent.count {
+                all = all.and(&self.by[k].by_rate(order), step[k]);
+            }
+        }
+        all
+    }
 }
 
 /// Whether there is a shortest turn from the tool axis at home: not to no direction, and not to the opposite one.

@@ -5,13 +5,14 @@
 //! what it is off by, per unit of the direction, the forces must answer.
 
 use crate::constraint;
-use crate::coordinates::{self, MAX_COORDINATES, Set, Values};
+use crate::coordinates::{self, Following, MAX_COORDINATES, Set, Values, Variation, Varying};
 use crate::dynamics::{Answering, leg_wrench, load_in_base, own_wrench};
-use crate::lanes::{Lanes, Work};
+use crate::geometry::{self, Parameter};
+use crate::lanes::Lanes;
 use crate::leg;
 use crate::mechanism::{Leg, Mechanism};
 use crate::real::{Constant, Dual, Jet, Real};
-use crate::spatial::{Acceleration, Mat3, Motion, Pose, Twist, Vec3, Wrench};
+use crate::spatial::{Acceleration, Motion, Pose, Twist, Vec3, Wrench};
 use crate::spec::Axes;
 
 /// Numbers that a motion is varied in: six of the pose (o moves, and the platform turns about axes of the base through
@@ -40,7 +41,7 @@ pub(crate) fn by_motion<V: Lanes>(mech: &Mechanism, at: &Solved<V>) -> [Column<V
         step[direction] = V::one();
         let varied = along(&at.platform, &step);
         let (load, axes) = at.load;
-        let load = Wrench::new(kept_vector(load.force), kept_vector(load.torque));
+        let load = Wrench::new(load.force.with_rate(Vec3::zero()), load.torque.with_rate(Vec3::zero()));
         let mut sum = own_wrench(mech, &varied, load_in_base(load, axes, &varied.pose));
         let mut row = 0;
         for (i, leg) in mech.legs.iter().enumerate() {
@@ -77,14 +78,13 @@ fn with_leg<S: Constant<Dual<V>>, V: Lanes>(
 /// The motion as it varies with a step in all directions.
 #[inline(always)]
 fn along<V: Lanes>(at: &Motion<V>, step: &[V; DIRECTIONS]) -> Motion<Dual<V>> {
-    let (turn, [x, y, z]) = (part(step, 1), at.pose.rotation.0);
-    let columns = [with_rate(x, turn.cross(x)), with_rate(y, turn.cross(y)), with_rate(z, turn.cross(z))];
+    let Motion { pose, twist, acceleration } = at;
     Motion {
-        pose: Pose { rotation: Mat3(columns), o: with_rate(at.pose.o, part(step, 0)) },
-        twist: Twist::new(with_rate(at.twist.v, part(step, 2)), with_rate(at.twist.omega, part(step, 3))),
+        pose: pose.along(&Twist::new(part(step, 0), part(step, 1))),
+        twist: Twist::new(twist.v.with_rate(part(step, 2)), twist.omega.with_rate(part(step, 3))),
         acceleration: Acceleration::new(
-            with_rate(at.acceleration.a, part(step, 4)),
-            with_rate(at.acceleration.eps, part(step, 5)),
+            acceleration.a.with_rate(part(step, 4)),
+            acceleration.eps.with_rate(part(step, 5)),
         ),
     }
 }
@@ -95,44 +95,41 @@ fn part<V: Lanes>(step: &[V; DIRECTIONS], k: usize) -> Vec3<V> {
     Vec3::new(step[3 * k], step[3 * k + 1], step[3 * k + 2])
 }
 
-/// The step that a motion varies by: the inverse of [`along`].
+/// The step that a motion varies by, in all directions.
 #[inline(always)]
-fn step_of<V: Lanes>(varied: &Motion<Dual<V>>) -> [V; DIRECTIONS] {
-    let Motion { pose, twist, acceleration } = varied;
-    let [x, y, z] = pose.rotation.0;
-    let turn =
-        (value(x).cross(rate_of(x)) + value(y).cross(rate_of(y)) + value(z).cross(rate_of(z))).scale(0.5);
-    let parts = [
-        rate_of(pose.o),
-        turn,
-        rate_of(twist.v),
-        rate_of(twist.omega),
-        rate_of(acceleration.a),
-        rate_of(acceleration.eps),
-    ];
+fn step_of<V: Lanes>(rates: &Pose<Jet<V>>, varied: &Variation<V>) -> [V; DIRECTIONS] {
+    let [now, moved] = [parts_of(rates), varied.pose];
+    // ω = ½ Σ x × x' over the columns of R, ε = ½ Σ x × x'' [T19]; a turn δθ makes δx = δθ × x.
+    let (mut turn, mut omega, mut eps) = (Vec3::zero(), Vec3::zero(), Vec3::zero());
+    for k in 0..3 {
+        turn = turn + now[0][k].cross(moved[0][k]);
+        omega = omega + now[0][k].cross(moved[1][k]) + moved[0][k].cross(now[1][k]);
+        eps = eps + now[0][k].cross(moved[2][k]) + moved[0][k].cross(now[2][k]);
+    }
+    let halves = [turn.scale(0.5), omega.scale(0.5), eps.scale(0.5)];
     let mut step = [V::zero(); DIRECTIONS];
-    for k in 0..6 {
-        let part = parts[k].array();
+    for order in 0..3 {
+        let (linear, angular) = (moved[order][3].array(), halves[order].array());
         for i in 0..3 {
-            step[3 * k + i] = part[i];
+            step[6 * order + i] = linear[i];
+            step[6 * order + 3 + i] = angular[i];
         }
     }
     step
 }
 
+/// Columns of R, then o: values, rates, second rates.
 #[inline(always)]
-fn with_rate<V: Lanes>(a: Vec3<V>, d: Vec3<V>) -> Vec3<Dual<V>> {
-    Vec3 { x: Dual::new(a.x, d.x), y: Dual::new(a.y, d.y), z: Dual::new(a.z, d.z) }
-}
-
-#[inline(always)]
-fn kept_vector<V: Lanes>(a: Vec3<V>) -> Vec3<Dual<V>> {
-    with_rate(a, Vec3::zero())
-}
-
-#[inline(always)]
-fn value<V: Lanes>(a: Vec3<Dual<V>>) -> Vec3<V> {
-    Vec3 { x: a.x.x, y: a.y.x, z: a.z.x }
+fn parts_of<V: Lanes>(pose: &Pose<Jet<V>>) -> [[Vec3<V>; 4]; 3] {
+    let [x, y, z] = pose.rotation.0;
+    let (vectors, mut all) = ([x, y, z, pose.o], [[Vec3::zero(); 4]; 3]);
+    for k in 0..4 {
+        let Vec3 { x, y, z } = vectors[k];
+        all[0][k] = Vec3::new(x.x, y.x, z.x);
+        all[1][k] = Vec3::new(x.d, y.d, z.d);
+        all[2][k] = Vec3::new(x.dd, y.dd, z.dd);
+    }
+    all
 }
 
 #[inline(always)]
@@ -157,65 +154,47 @@ fn combined<V: Lanes>(by_motion: &[Column<V>; DIRECTIONS], step: &[V; DIRECTIONS
     sum
 }
 
-/// What the coordinates are at a state, and which of them are given.
+/// The coordinates at a state, and how the motion follows them.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Given<'a, V> {
-    pub q: Values<Jet<V>>,
-    pub given: &'a [bool; MAX_COORDINATES],
+pub(crate) struct Coordinates<V: Real> {
+    q: Values<Jet<V>>,
+    pose: Pose<Jet<V>>,
+    pub following: Following<V>,
 }
 
-/// The derivative by a given coordinate, its rate or its second rate (order 0, 1 or 2), the others of these kept and
-/// dependent coordinates following.
-#[inline(always)]
-pub(crate) fn by_coordinate<V: Lanes>(
-    mech: &Mechanism,
-    set: &Set,
-    by_motion: &[Column<V>; DIRECTIONS],
-    at: &Given<V>,
-    coordinate: usize,
-    order: usize,
-) -> Column<V> {
-    let mut q = kept(&at.q);
-    match order {
-        0 => q[coordinate].x.d = V::one(),
-        1 => q[coordinate].d.d = V::one(),
-        _ => q[coordinate].dd.d = V::one(),
-    }
-    combined(by_motion, &step_of(&V::apart(Varying { mech, set, q: &q, given: at.given })))
-}
-
-/// Coordinates and their rates that do not vary.
-#[inline(always)]
-fn kept<V: Lanes>(q: &Values<Jet<V>>) -> Values<Jet<Dual<V>>> {
-    let mut kept = [Jet::zero(); MAX_COORDINATES];
-    for k in 0..MAX_COORDINATES {
-        let Jet { x, d, dd } = q[k];
-        kept[k] = Jet::new(Dual::new(x, V::zero()), Dual::new(d, V::zero()), Dual::new(dd, V::zero()));
-    }
-    kept
-}
-
-/// The motion of coordinates that vary, or of a mechanism that does.
-struct Varying<'a, S, V> {
-    mech: &'a Mechanism<S>,
-    set: &'a Set<S>,
-    q: &'a Values<Jet<Dual<V>>>,
-    given: &'a [bool; MAX_COORDINATES],
-}
-
-impl<S, V: Lanes> Work<V> for Varying<'_, S, V>
-where
-    S: Constant<Jet<Dual<V>>> + Constant<Dual<Dual<V>>>,
-{
-    type Result = Motion<Dual<V>>;
-
+impl<V: Lanes> Coordinates<V> {
     #[inline(always)]
-    fn run(self) -> Motion<Dual<V>> {
-        coordinates::varied(self.mech, self.set, self.q, self.given)
+    pub(crate) fn at(
+        mech: &Mechanism,
+        set: &Set,
+        still: &Varied,
+        given: &[bool; MAX_COORDINATES],
+        platform: &Motion<V>,
+    ) -> Self {
+        let q = coordinates::along(mech, set, platform);
+        Coordinates { q, pose: platform.jets(), following: Following::at(&still.mech, &still.set, &q, given) }
+    }
+
+    /// What varies with a number of the set.
+    #[inline(always)]
+    pub(crate) fn varied(&self, still: &Varied, number: usize) -> Variation<V> {
+        V::apart(Varying { mech: &still.mech, set: &still.set, q: &self.q, number: Some(number) })
+    }
+
+    /// The derivative by a given coordinate that these vary with, or by its rate or second rate (order 1 or 2), the others
+    /// of these kept and dependent coordinates following.
+    #[inline(always)]
+    pub(crate) fn derivative(
+        &self,
+        by_motion: &[Column<V>; DIRECTIONS],
+        varied: &Variation<V>,
+        order: usize,
+    ) -> Column<V> {
+        combined(by_motion, &step_of(&self.pose, &self.following.with(varied.by_rate(order))))
     }
 }
 
-/// A mechanism that varies with one number of its geometry.
+/// A mechanism that varies with one number of its geometry, or with none.
 #[derive(Clone, Debug)]
 pub(crate) struct Varied {
     mech: Mechanism<Dual<f64>>,
@@ -228,8 +207,15 @@ pub(crate) struct Varied {
 }
 
 impl Varied {
+    /// Nothing varies.
+    pub(crate) fn none(mech: &Mechanism, set: &Set) -> Self {
+        let (legs, constraints) = (vec![], vec![]);
+        Varied { mech: geometry::varied(mech, None), set: set.lifted(), legs, constraints, moves: false }
+    }
+
     /// None if the set is none of the mechanism while it varies.
-    pub(crate) fn new(mech: Mechanism<Dual<f64>>, set: &Set) -> Option<Self> {
+    pub(crate) fn new(mech: &Mechanism, by: &Parameter, set: &Set) -> Option<Self> {
+        let mech = geometry::varied(mech, Some(by));
         let varies = |a: Vec3<Dual<f64>>| a.array().iter().any(|x| x.d != 0.0);
         let leg_varies = |leg: &Leg<Dual<f64>>| {
             varies(leg.base.point) || varies(leg.platform.point) || varies(leg.turning.axis())
@@ -253,7 +239,7 @@ pub(crate) fn by_geometry<V: Lanes>(
     varied: &Varied,
     solved: &Solved<V>,
     by_motion: &[Column<V>; DIRECTIONS],
-    at: &Given<V>,
+    at: &Coordinates<V>,
     lengths: &mut [V],
 ) -> Column<V> {
     let Varied { mech, set, legs, constraints, moves } = varied;
@@ -271,14 +257,16 @@ pub(crate) fn by_geometry<V: Lanes>(
         let multiplier = Dual::new(solved.forces[mech.dof() + k], V::zero());
         sum = sum + constraint::row(&mech.independent[k], &still.pose) * multiplier;
     }
-    let (mut column, mut moving) = (solved.answering.to(rate(sum)), still);
+    let (mut column, mut step) = (solved.answering.to(rate(sum)), [V::zero(); DIRECTIONS]);
     if *moves {
-        moving = V::apart(Varying { mech, set, q: &kept(&at.q), given: at.given });
-        let moved = combined(by_motion, &step_of(&moving));
+        let variation = V::apart(Varying { mech, set, q: &at.q, number: None });
+        step = step_of(&at.pose, &at.following.with(variation));
+        let moved = combined(by_motion, &step);
         for i in 0..6 {
             column[i] = column[i] + moved[i];
         }
     }
+    let moving = along(&solved.platform, &step);
     for (i, leg) in mech.legs.iter().enumerate() {
         lengths[i] = leg::position(leg, &moving.pose).length.d;
     }

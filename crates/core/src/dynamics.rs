@@ -278,34 +278,49 @@ pub(crate) fn transposed<T: Real>(m: &Matrix6<T>) -> Matrix6<T> {
 /// gives the power of inertia and weight without the way that [`inverse_dynamics`] takes.
 #[inline(always)]
 pub fn energy<T: Real>(mech: &Mechanism<impl Constant<T>>, pose: &Pose<T>, twist: &Twist<T>) -> (T, T) {
-    let gravity = Vec3::lift(mech.gravity);
     let platform = Motion { pose: *pose, twist: *twist, acceleration: Acceleration::zero() };
-    let link = |body: &Body, axes: Mat3<T>, omega: Vec3<T>, velocity: Vec3<T>, place: Vec3<T>| {
-        let (omega, mass) = (axes.transpose_mul(omega), T::lit(body.mass));
-        let kinetic =
-            (velocity.dot(velocity) * mass + omega.dot(Mat3::lift(body.inertia) * omega)) * T::lit(0.5);
-        (kinetic, -(gravity.dot(place) * mass))
-    };
     let center = pose.rotation * Vec3::lift(mech.platform.center);
     let velocity = twist.v + twist.omega.cross(center);
-    let mut sum = link(&mech.platform, pose.rotation, twist.omega, velocity, pose.o + center);
-    let mut add = |(kinetic, potential): (T, T)| sum = (sum.0 + kinetic, sum.1 + potential);
+    let mut sum = (T::zero(), T::zero());
+    sum = with_energy(sum, mech, &mech.platform, pose.rotation, twist.omega, velocity, pose.o + center);
     for (i, leg) in mech.legs.iter().enumerate() {
         let state = leg::state(leg, &platform);
         let (axes, omega) = (state.frame.axes, state.omega());
         let base = Vec3::lift(leg.base.point);
         let (piston, cylinder) = (leg::piston(leg, &state), leg::cylinder(leg, &state));
-        add(link(&leg.piston, axes, omega, piston.velocity, base + state.position.r + piston.offset));
-        add(link(&leg.cylinder, axes, omega, cylinder.velocity, base + cylinder.offset));
-        for rod in mech.rods.iter().filter(|rod| rod.leader == i) {
-            let (axis, n) = (Vec3::lift(rod.axis), state.frame.n());
-            let omega = axis * leg::rod_turn(axis, &state).rate;
-            let axes = Mat3::from_columns(axis, n, axis.cross(n));
-            let center = axes * Vec3::lift(rod.body.center);
-            add(link(&rod.body, axes, omega, omega.cross(center), Vec3::lift(rod.point) + center));
+        let place = base + state.position.r + piston.offset;
+        sum = with_energy(sum, mech, &leg.piston, axes, omega, piston.velocity, place);
+        let place = base + cylinder.offset;
+        sum = with_energy(sum, mech, &leg.cylinder, axes, omega, cylinder.velocity, place);
+        for rod in &mech.rods {
+            if rod.leader == i {
+                let (axis, n) = (Vec3::lift(rod.axis), state.frame.n());
+                let omega = axis * leg::rod_turn(axis, &state).rate;
+                let axes = Mat3::from_columns(axis, n, axis.cross(n));
+                let center = axes * Vec3::lift(rod.body.center);
+                let (velocity, place) = (omega.cross(center), Vec3::lift(rod.point) + center);
+                sum = with_energy(sum, mech, &rod.body, axes, omega, velocity, place);
+            }
         }
     }
     sum
+}
+
+/// Kinetic and potential energy with those of one more link: its axes, angular velocity, and velocity and place of its
+/// mass centre.
+#[inline(always)]
+fn with_energy<T: Real>(
+    (kinetic, potential): (T, T),
+    mech: &Mechanism<impl Constant<T>>,
+    body: &Body,
+    axes: Mat3<T>,
+    omega: Vec3<T>,
+    velocity: Vec3<T>,
+    place: Vec3<T>,
+) -> (T, T) {
+    let (omega, mass) = (axes.transpose_mul(omega), T::lit(body.mass));
+    let moving = (velocity.dot(velocity) * mass + omega.dot(Mat3::lift(body.inertia) * omega)) * T::lit(0.5);
+    (kinetic + moving, potential - Vec3::lift(mech.gravity).dot(place) * mass)
 }
 
 /// Forces along c_1 that two coupled legs put on the platform at their ends, and the torque T_c about the rod's line.
@@ -332,10 +347,10 @@ pub fn coupled_forces<T: Real>(
     as_printed: bool,
 ) -> Coupled<T> {
     let (axis, l) = (Vec3::lift(axis), pose.rotation * Vec3::lift(platform_axis));
-    let [first, third] = pair.map(|i| leg::position(&mech.legs[i], pose));
+    let (first, third) = (leg::position(&mech.legs[pair[0]], pose), leg::position(&mech.legs[pair[1]], pose));
     // c_1 along r_1 × L; d_i is the moment arm about L of a force along c_1 at b_i.
     let c1 = first.r.cross(axis).unit();
-    let [d1, d3] = [first, third].map(|p| p.r.cross(axis).dot(c1));
+    let (d1, d3) = (first.r.cross(axis).dot(c1), third.r.cross(axis).dot(c1));
     let length = (first.e - third.e).dot(l);
     let forces = if as_printed {
         let f1 = f_c / (T::one() + d1 / d3);

@@ -69,14 +69,14 @@ pub fn parameters(mech: &Mechanism) -> Vec<Parameter> {
         .collect()
 }
 
-/// The mechanism with the derivative of all its parts by one of its numbers. The home pose is kept, and with it the angle
-/// between legs on one rod.
+/// The mechanism with the derivative of all its parts by one of its numbers, zero for none. The home pose is kept, and with
+/// it the angle between legs on one rod.
 #[must_use]
-pub fn varied(mech: &Mechanism, by: &Parameter) -> Mechanism<Dual<f64>> {
+pub fn varied(mech: &Mechanism, by: Option<&Parameter>) -> Mechanism<Dual<f64>> {
     let lift = |place: Place, vector: Vector, a: Vec3<f64>| -> Vec3<Dual<f64>> {
-        if (place, vector) != (by.place, by.vector) {
+        let Some(by) = by.filter(|by| (place, vector) == (by.place, by.vector)) else {
             return Vec3::lift(a);
-        }
+        };
         let step = [Vec3::X, Vec3::Y, Vec3::Z][by.component];
         a.with_rate(if vector == Vector::Point { step } else { step - a * a.dot(step) })
     };

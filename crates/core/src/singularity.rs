@@ -8,7 +8,7 @@ use crate::jacobian::Matrix6;
 use crate::leg;
 use crate::linear;
 use crate::mechanism::{Constraint, Mechanism};
-use crate::real::{Dual, Real};
+use crate::real::{Dual, Ordered, Real};
 use crate::spatial::{Pose, Twist, Vec3, Wrench};
 use crate::svd::Svd;
 
@@ -126,11 +126,16 @@ fn pure_row<T: Real>(row: Wrench<T>, scale: f64) -> [T; 6] {
 /// J in pure numbers for the length `scale`: its determinant says on which side of the singular poses a pose is \[T30\].
 #[inline(always)]
 pub fn pure_jacobian<T: Real>(mech: &Mechanism, pose: &Pose<T>, scale: f64) -> Matrix6<T> {
-    let mut rows = [[T::zero(); 6]; 6];
-    let legs = mech.actuated().map(|(_, leg)| pure_row(leg::row(&leg::position(leg, pose)), scale));
-    let constraints = mech.independent.iter().map(|c| constraint_row(c, pose, scale));
-    for (row, values) in rows.iter_mut().zip(legs.chain(constraints)) {
-        *row = values;
+    let (mut rows, mut count) = ([[T::zero(); 6]; 6], 0);
+    for leg in &mech.legs {
+        if leg.actuated {
+            rows[count] = pure_row(leg::row(&leg::position(leg, pose)), scale);
+            count += 1;
+        }
+    }
+    for c in &mech.independent {
+        rows[count] = constraint_row(c, pose, scale);
+        count += 1;
     }
     rows
 }
@@ -140,11 +145,19 @@ const DETERMINANT_ROUNDING: f64 = 4e-15;
 
 /// det J, zero within rounding, and its exact rate along a twist \[T30\].
 #[must_use]
-pub fn determinant(mech: &Mechanism, pose: &Pose<f64>, twist: &Twist<f64>, scale: f64) -> Dual<f64> {
+#[inline(always)]
+pub fn determinant<V: Ordered>(mech: &Mechanism, pose: &Pose<V>, twist: &Twist<V>, scale: f64) -> Dual<V> {
     let rows = pure_jacobian(mech, &pose.along(twist), scale);
-    let det = linear::determinant(&rows);
-    let size: f64 = rows.iter().map(|row| row.iter().map(|e| e.x * e.x).sum::<f64>().sqrt()).product();
-    if det.x.abs() <= DETERMINANT_ROUNDING * size { Dual::new(0.0, det.d) } else { det }
+    let (det, mut size) = (linear::determinant(&rows), V::one());
+    for i in 0..6 {
+        let mut square = V::zero();
+        for j in 0..6 {
+            square = rows[i][j].x.mul_add(rows[i][j].x, square);
+        }
+        size = size * square.sqrt();
+    }
+    let nothing = det.x.abs().at_most(size.scale(DETERMINANT_ROUNDING));
+    Dual::new(V::select(nothing, V::zero(), det.x), det.d)
 }
 
 /// The smallest singular value of J in pure numbers; NaN where an actuated leg has no direction.

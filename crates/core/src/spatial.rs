@@ -91,6 +91,13 @@ impl<T: Real> Vec3<T> {
         self.into()
     }
 
+    /// The vector with its rate.
+    #[must_use]
+    #[inline(always)]
+    pub fn with_rate(self, d: Self) -> Vec3<Dual<T>> {
+        Vec3 { x: Dual::new(self.x, d.x), y: Dual::new(self.y, d.y), z: Dual::new(self.z, d.z) }
+    }
+
     /// The vector with its rate and second rate.
     #[must_use]
     #[inline(always)]
@@ -101,12 +108,6 @@ impl<T: Real> Vec3<T> {
 }
 
 impl Vec3<f64> {
-    /// The vector with its rate.
-    #[must_use]
-    pub fn with_rate(self, d: Self) -> Vec3<Dual<f64>> {
-        Vec3::new(Dual::new(self.x, d.x), Dual::new(self.y, d.y), Dual::new(self.z, d.z))
-    }
-
     pub const X: Self = Vec3 { x: 1.0, y: 0.0, z: 0.0 };
     pub const Y: Self = Vec3 { x: 0.0, y: 1.0, z: 0.0 };
     pub const Z: Self = Vec3 { x: 0.0, y: 0.0, z: 1.0 };
@@ -378,16 +379,18 @@ impl<T: Real> Pose<T> {
     }
 }
 
-impl Pose<f64> {
+impl<T: Real> Pose<T> {
     /// The pose with its rate along a twist.
     #[must_use]
-    pub fn along(&self, twist: &Twist<f64>) -> Pose<Dual<f64>> {
-        Pose {
-            rotation: Mat3(self.rotation.0.map(|c| c.with_rate(twist.omega.cross(c)))),
-            o: self.o.with_rate(twist.v),
-        }
+    #[inline(always)]
+    pub fn along(&self, twist: &Twist<T>) -> Pose<Dual<T>> {
+        let (omega, [x, y, z]) = (twist.omega, self.rotation.0);
+        let columns = [x.with_rate(omega.cross(x)), y.with_rate(omega.cross(y)), z.with_rate(omega.cross(z))];
+        Pose { rotation: Mat3(columns), o: self.o.with_rate(twist.v) }
     }
+}
 
+impl Pose<f64> {
     /// The homogeneous matrix, row by row.
     #[must_use]
     pub fn matrix(&self) -> [f64; 16] {

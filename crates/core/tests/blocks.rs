@@ -57,7 +57,7 @@ impl Arrays {
 
 type Operation = fn(&Mechanism, &Arrays) -> Table;
 
-const OPERATIONS: [(&str, Operation); 13] = [
+const OPERATIONS: [(&str, Operation); 17] = [
     ("inverse kinematics", |mech, a| batch::inverse_kinematics(mech, &a.poses)),
     ("Jacobian", |mech, a| batch::jacobians(mech, &a.poses)),
     ("Hessian", |mech, a| batch::hessians(mech, &a.poses)),
@@ -82,6 +82,12 @@ const OPERATIONS: [(&str, Operation); 13] = [
         batch::inverse_dynamics_derivatives(mech, &a.states(), &Loads::Own, &set, &given)
     }),
     ("regressor", |mech, a| batch::regressors(mech, &a.states(), &Loads::Own)),
+    ("power", |mech, a| batch::power(mech, &a.states(), &Loads::Own)),
+    ("determinant", |mech, a| batch::determinants(mech, &a.poses, &a.twists, 1.0)),
+    ("coordinates", |mech, a| batch::coordinate_values(mech, &Set::of(mech)[0], &a.poses)),
+    ("coupled forces", |mech, a| {
+        batch::coupled_forces(mech, &a.poses, &a.of_legs, false).expect("a pair on a rod").1
+    }),
 ];
 
 /// Both in one test: nothing else is to allocate or to run beside them.

@@ -186,10 +186,6 @@ pub(super) fn then(first: Status, second: impl FnOnce() -> Status) -> Status {
     if first == Status::Ok { second() } else { first }
 }
 
-pub(super) fn check_finite(values: &[f64]) -> Status {
-    if values.iter().all(|x| x.is_finite()) { Status::Ok } else { Status::InvalidInput }
-}
-
 /// The first limit of a joint that a pose breaks.
 #[inline(always)]
 pub(super) fn within_limits<V: Lanes>(mech: &Mechanism, pose: &Pose<V>, codes: Codes<V>) -> Codes<V> {
@@ -241,10 +237,6 @@ pub(super) fn joint_limits(mech: &Mechanism) -> impl Iterator<Item = &Limit> {
 pub(super) fn solved<V: Lanes>(mech: &Mechanism, solution: &[V], pivots: V, codes: Codes<V>) -> Codes<V> {
     let least = if mech.mobility.uncontrolled == 0 { SINGULAR_PIVOTS } else { f64::INFINITY };
     codes.unless(pivots.greater(V::lit(least)), Status::Singular).unless(finite(solution), Status::Singular)
-}
-
-pub(super) fn outcome(mech: &Mechanism, solution: &[f64; 6], pivots: f64) -> Status {
-    solved(mech, solution, pivots, Codes::ok()).status()
 }
 
 /// One number of each actuated leg, of as many as there are legs; zero beyond.

@@ -3,7 +3,7 @@
 use super::Table;
 use super::block::{self, Answers, At, Codes, Operation, Pieces};
 use super::checks::{
-    check_legs, check_motion, finite, is_rotation, raw_pose, read_pose, then, with_legs, with_motion,
+    check_legs, check_motion, finite, is_rotation, pose_at, raw_pose, then, with_legs, with_motion,
 };
 use crate::coordinates::{self, Dependent, MAX_COORDINATES, Set, State, Values};
 use crate::lanes::Lanes;
@@ -185,13 +185,25 @@ fn checked(mech: &Mechanism, mut state: State, all_given: bool) -> State {
 /// The numbers of a set at each pose: the inverse of [`states`].
 #[must_use]
 pub fn coordinate_values(mech: &Mechanism, set: &Set, poses: &[f64]) -> Table {
-    let n = poses.len() / 16;
-    let (fields, [values]) = ([("coordinates", vec![set.names().len()])], block::fields());
-    block::one_by_one(n, fields, Pieces::QUICK, |rows, i| {
-        let (pose, status) = read_pose(mech, poses, i);
-        if status == Status::Ok {
-            rows.set(values, i, 0, &set.values(mech, &pose)[..set.names().len()]);
+    let fields = [("coordinates", vec![set.names().len()])];
+    block::table(&ValuesAt { mech, set, poses }, poses.len() / 16, fields)
+}
+
+struct ValuesAt<'a> {
+    mech: &'a Mechanism,
+    set: &'a Set,
+    poses: &'a [f64],
+}
+
+impl Operation<1> for ValuesAt<'_> {
+    #[inline(always)]
+    fn run<V: Lanes>(&self, at: At, answers: &mut Answers<'_, 1>) -> Codes<V> {
+        let (mech, [values]) = (self.mech, Answers::fields());
+        let (pose, codes) = pose_at::<V>(mech, self.poses, at);
+        let q = self.set.values(mech, &pose);
+        for k in 0..self.set.names().len() {
+            answers.put(values, k, [q[k]]);
         }
-        status
-    })
+        codes
+    }
 }

@@ -3,8 +3,8 @@
 use super::block::{self, Answers, At, Codes, Working};
 use super::checks::{solved, within_limits};
 use super::{FieldId, Loads, States, Table};
-use crate::coordinates::{self, DEPENDENT_PIVOTS, MAX_COORDINATES, Set};
-use crate::derivatives::{self, Column, DIRECTIONS, Given, Solved, Varied};
+use crate::coordinates::{DEPENDENT_PIVOTS, MAX_COORDINATES, Set};
+use crate::derivatives::{self, Column, Coordinates, DIRECTIONS, Solved, Varied};
 use crate::dynamics::{Answering, resultant};
 use crate::geometry;
 use crate::inertial::{self, Regressor};
@@ -52,7 +52,7 @@ pub fn inverse_dynamics_derivatives(
         ("constraint_by_geometry", vec![multipliers, geometry.len()]),
         ("lengths_by_geometry", vec![forces, geometry.len()]),
     ];
-    let varied = geometry.iter().map(|parameter| Varied::new(geometry::varied(mech, parameter), set));
+    let varied = geometry.iter().map(|parameter| Varied::new(mech, parameter, set));
     let operation = Derivatives {
         mech,
         states,
@@ -60,6 +60,7 @@ pub fn inverse_dynamics_derivatives(
         set,
         given: &given,
         numbers: (0..set.names().len()).filter(|&k| given[k]).collect(),
+        still: Varied::none(mech, set),
         varied: varied.collect::<Option<Vec<_>>>(),
         parameters: geometry.len(),
         regressor: Regressor::new(mech),
@@ -75,7 +76,8 @@ struct Derivatives<'a> {
     given: &'a [bool; MAX_COORDINATES],
     /// Numbers of the given coordinates.
     numbers: Vec<usize>,
-    /// The mechanism as it varies with each number of the geometry; none if the set is none of it then.
+    /// The mechanism as it varies with none of its numbers, and with each of the geometry; none if the set is none of it then.
+    still: Varied,
     varied: Option<Vec<Varied>>,
     parameters: usize,
     regressor: Regressor,
@@ -109,13 +111,13 @@ impl Working<17> for Derivatives<'_> {
         }
         self.put_by_bodies(room, &state, pair(&ids, 6), answers);
 
-        let q = coordinates::along(mech, self.set, &state.platform);
-        let determined = coordinates::determined(mech, self.set, &q, self.given);
-        let determined = determined.greater(V::lit(DEPENDENT_PIVOTS));
-        let (given, mut sum) = (Given { q, given: self.given }, V::zero());
-        for order in 0..3 {
-            for (k, &number) in self.numbers.iter().enumerate() {
-                let column = derivatives::by_coordinate(mech, self.set, &by_motion, &given, number, order);
+        let by = Coordinates::at(mech, self.set, &self.still, self.given, &state.platform);
+        let determined = by.following.pivots.greater(V::lit(DEPENDENT_PIVOTS));
+        let mut sum = V::zero();
+        for (k, &number) in self.numbers.iter().enumerate() {
+            let varied = by.varied(&self.still, number);
+            for order in 0..3 {
+                let column = by.derivative(&by_motion, &varied, order);
                 sum = add(sum, &column);
                 put(mech, answers, pair(&ids, 3 + order), self.numbers.len(), k, &column);
             }
@@ -126,7 +128,7 @@ impl Working<17> for Derivatives<'_> {
         for k in 0..self.parameters {
             let column = match &self.varied {
                 Some(varied) => {
-                    derivatives::by_geometry(&varied[k], &state, &by_motion, &given, &mut room.lengths)
+                    derivatives::by_geometry(&varied[k], &state, &by_motion, &by, &mut room.lengths)
                 }
                 None => [V::lit(f64::NAN); 6],
             };

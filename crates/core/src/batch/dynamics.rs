@@ -1,10 +1,7 @@
 //! Dynamics of many states.
 
-use super::block::{self, Answers, At, Codes, Operation, Pieces};
-use super::checks::{
-    check_finite, finite, limit_status, outcome, read_pose, solved, then, with_leg, with_motion,
-    within_limits_of,
-};
+use super::block::{self, Answers, At, Codes, Operation};
+use super::checks::{finite, pose_at, solved, with_leg, with_motion, within_limits, within_limits_of};
 use super::{FieldId, States, Table};
 use crate::dynamics::{self, Balance};
 use crate::lanes::Lanes;
@@ -110,30 +107,40 @@ pub fn coupled_forces(
 ) -> Option<([usize; 2], Table)> {
     let (pair, axis, platform_axis) = mobility::coupled_pair(mech)?;
     let index = mech.independent.iter().position(|c| pair.contains(&c.leg))?;
-    let (n, k) = (poses.len() / 16, mech.independent.len());
-    let (fields, [forces, torque]) = ([("forces", vec![2]), ("torque", vec![])], block::fields());
-    let table = block::one_by_one(n, fields, Pieces::QUICK, |rows, i| {
-        let (pose, status) = read_pose(mech, poses, i);
-        let f_c = multipliers[i * k + index];
-        let status = then(status, || check_finite(&[f_c]));
-        if status != Status::Ok {
-            return status;
-        }
-        let c = dynamics::coupled_forces(mech, pair, axis, platform_axis, &pose, f_c, as_printed);
-        if !c.forces.iter().all(|f| f.is_finite()) {
-            return Status::Singular;
-        }
-        rows.set(forces, i, 0, &c.forces);
-        rows.set(torque, i, 0, &[c.torque]);
-        Status::Ok
-    });
-    Some((pair, table))
+    let operation = CoupledForces { mech, pair, axis, platform_axis, index, poses, multipliers, as_printed };
+    let fields = [("forces", vec![2]), ("torque", vec![])];
+    Some((pair, block::table(&operation, poses.len() / 16, fields)))
+}
+
+struct CoupledForces<'a> {
+    mech: &'a Mechanism,
+    pair: [usize; 2],
+    axis: Vec3<f64>,
+    platform_axis: Vec3<f64>,
+    /// Which of the multipliers is theirs.
+    index: usize,
+    poses: &'a [f64],
+    multipliers: &'a [f64],
+    as_printed: bool,
+}
+
+impl Operation<2> for CoupledForces<'_> {
+    #[inline(always)]
+    fn run<V: Lanes>(&self, at: At, answers: &mut Answers<'_, 2>) -> Codes<V> {
+        let (mech, [forces, torque]) = (self.mech, Answers::fields());
+        let (pose, codes) = pose_at(mech, self.poses, at);
+        let f_c: V = at.read_one(self.multipliers, mech.independent.len(), self.index);
+        let (axis, platform_axis) = (self.axis, self.platform_axis);
+        let c = dynamics::coupled_forces(mech, self.pair, axis, platform_axis, &pose, f_c, self.as_printed);
+        answers.put(forces, 0, c.forces);
+        answers.put(torque, 0, [c.torque]);
+        codes.unless(finite(&[f_c]), Status::InvalidInput).unless(finite(&c.forces), Status::Singular)
+    }
 }
 
 /// Energies with their exact rates along the motion, and every power of the balance \[T17\].
 #[must_use]
 pub fn power(mech: &Mechanism, states: &States, loads: &Loads) -> Table {
-    let n = states.len();
     let names = [
         "kinetic",
         "potential",
@@ -145,38 +152,51 @@ pub fn power(mech: &Mechanism, states: &States, loads: &Loads) -> Table {
         "friction",
         "residual",
     ];
-    let ids: [FieldId; 9] = block::fields();
-    let fields = names.map(|name| (name, vec![]));
-    block::one_by_one(n, fields, Pieces::QUICK, |rows, i| {
-        let (platform, wrench, status) = states.one(mech, loads, i);
+    block::table(&Power { mech, states, loads }, states.len(), names.map(|name| (name, vec![])))
+}
+
+struct Power<'a> {
+    mech: &'a Mechanism,
+    states: &'a States<'a>,
+    loads: &'a Loads<'a>,
+}
+
+impl Operation<9> for Power<'_> {
+    #[inline(always)]
+    fn run<V: Lanes>(&self, at: At, answers: &mut Answers<'_, 9>) -> Codes<V> {
+        let (mech, ids) = (self.mech, Answers::<9>::fields());
+        let (platform, wrench, codes) = self.states.loaded_at::<V>(mech, self.loads, at);
         let Motion { pose, twist, .. } = &platform;
-        if status != Status::Ok {
-            return status;
-        }
         let (kinetic, potential) = energy_along(mech, &platform);
         let load = wrench.power(twist);
-        let damping = -(mech.linear_damping * twist.v.dot(twist.v)
-            + mech.angular_damping * twist.omega.dot(twist.omega));
+        let damping = dynamics::damping_wrench(mech, twist).power(twist);
         let (f, pivots) = dynamics::inverse_dynamics(mech, &platform, wrench);
-        let rates = mech.actuated().map(|(_, leg)| leg::row(&leg::position(leg, pose)).power(twist));
-        let status = then(outcome(mech, &f, pivots), || limit_status(mech, pose));
-        let singular = status == Status::Singular;
-        let actuators = if singular { f64::NAN } else { rates.zip(&f).map(|(rate, f)| rate * f).sum() };
+        let regular = solved(mech, &f, pivots, Codes::ok()).are(Status::Ok);
+        let (mut actuators, mut row) = (V::zero(), 0);
+        for leg in &mech.legs {
+            if leg.actuated {
+                actuators = actuators + leg::row(&leg::position(leg, pose)).power(twist) * f[row];
+                row += 1;
+            }
+        }
+        actuators = V::select(regular, actuators, V::lit(f64::NAN));
         // What the efficiency takes: actuators serve the platform's term of [Eq. 42] 1/η times.
         let own = (wrench + dynamics::platform_wrench(mech, &platform)).power(twist);
-        let friction = (1.0 / mech.efficiency - 1.0) * own;
+        let friction = own.scale(1.0 / mech.efficiency - 1.0);
         let residual = actuators + load + damping + friction - kinetic.d - potential.d;
         let values =
             [kinetic.x, potential.x, kinetic.d, potential.d, actuators, load, damping, friction, residual];
-        for (id, value) in ids.into_iter().zip(values) {
-            rows.set(id, i, 0, &[value]);
+        for k in 0..9 {
+            answers.put(ids[k], 0, [values[k]]);
         }
-        status
-    })
+        // At a singular pose all but the actuators' power stands.
+        within_limits(mech, pose, codes.but(regular, Status::Singular))
+    }
 }
 
 /// Kinetic and potential energy as duals along the motion.
-fn energy_along(mech: &Mechanism, platform: &Motion<f64>) -> (Dual<f64>, Dual<f64>) {
+#[inline(always)]
+fn energy_along<V: Lanes>(mech: &Mechanism, platform: &Motion<V>) -> (Dual<V>, Dual<V>) {
     let Motion { pose, twist, acceleration } = platform;
     let moving = pose.along(twist);
     let twist = Twist::new(twist.v.with_rate(acceleration.a), twist.omega.with_rate(acceleration.eps));

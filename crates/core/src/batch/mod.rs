@@ -110,10 +110,4 @@ impl States<'_> {
         let load = loads.of(mech, &platform.pose, at);
         (platform, load, codes.unless(finite(&load.array()), Status::InvalidInput))
     }
-
-    /// A single state with the load at it.
-    fn one(&self, mech: &Mechanism, loads: &Loads, i: usize) -> (Motion<f64>, Wrench<f64>, Status) {
-        let (platform, load, codes) = self.loaded_at(mech, loads, At::one(i));
-        (platform, load, codes.status())
-    }
 }

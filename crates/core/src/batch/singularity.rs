@@ -1,9 +1,10 @@
 //! Singularities at many states.
 
-use super::block::{self, At, Pieces};
-use super::checks::{any_pose, kept, read_pose};
+use super::block::{self, Answers, At, Codes, Operation, Pieces};
+use super::checks::{any_pose, finite, kept, read_pose};
 use super::{FieldId, Table};
 use crate::coordinates::{self, Set};
+use crate::lanes::Lanes;
 use crate::mechanism::Mechanism;
 use crate::nearest::{self, Search};
 use crate::singularity;
@@ -37,19 +38,28 @@ pub fn conditioning(mech: &Mechanism, poses: &[f64], scale: f64) -> Table {
 /// det J in pure numbers and its exact rate along the twist \[T30\]. The rate is NaN where the twist has NaN.
 #[must_use]
 pub fn determinants(mech: &Mechanism, poses: &[f64], twists: &[f64], scale: f64) -> Table {
-    let n = poses.len() / 16;
-    let (fields, [value, rate]) = ([("determinant", vec![]), ("rate", vec![])], block::fields());
-    block::one_by_one(n, fields, Pieces::QUICK, |rows, i| {
-        let (pose, status) = read(mech, poses, i);
-        if status != Status::Ok {
-            return status;
-        }
-        let twist = Twist::from_array(At::one(i).read(twists));
-        let det = singularity::determinant(mech, &pose, &twist, scale);
-        rows.set(value, i, 0, &[det.x]);
-        rows.set(rate, i, 0, &[det.d]);
-        known(det.x)
-    })
+    let fields = [("determinant", vec![]), ("rate", vec![])];
+    block::table(&Determinants { mech, poses, twists, scale }, poses.len() / 16, fields)
+}
+
+struct Determinants<'a> {
+    mech: &'a Mechanism,
+    poses: &'a [f64],
+    twists: &'a [f64],
+    scale: f64,
+}
+
+impl Operation<2> for Determinants<'_> {
+    #[inline(always)]
+    fn run<V: Lanes>(&self, at: At, answers: &mut Answers<'_, 2>) -> Codes<V> {
+        let (mech, [value, rate]) = (self.mech, Answers::fields());
+        let (pose, codes) = any_pose::<V>(self.poses, at);
+        let twist = Twist::from_array(at.read(self.twists));
+        let det = singularity::determinant(mech, &pose, &twist, self.scale);
+        answers.put(value, 0, [det.x]);
+        answers.put(rate, 0, [det.d]);
+        kept(mech, &pose, codes).but(finite(&[det.x]), Status::Singular)
+    }
 }
 
 fn known(determinant: f64) -> Status {
