@@ -86,7 +86,7 @@ def test_planar_platforms_are_drawn_above_their_joints() -> None:
     mech = gallery.mechanism("planar")
     thick = 1e-3 * mech.to_dict()["legs"][0]["radius"]
     height = {
-        link.name: (link.mesh.vertices @ frame[:3, :3].T + frame[:3, 3])[:, 2] / thick
+        link.name: (link.mesh().vertices @ frame[:3, :3].T + frame[:3, 3])[:, 2] / thick
         for link, frame in zip(links_of(mech), link_frames(mech, mech.home).frames, strict=True)
     }
     # The inner side of a plate is two radii from its joints, the outer one nearly three; pins end at two.
