@@ -36,7 +36,7 @@ demo: $(BUILT) ## analyse the published manipulator: tables and figures into dem
 	$(BIN)/polypod demo -o demo
 
 test: test-rust tools $(BUILT) ## Rust and Python tests, without the slow ones
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest -n auto
 
 test-all: tools $(BUILT) ## all tests, the slow ones too
 	cargo test $(LOCKED) -p polypod-core -- --include-ignored

@@ -46,22 +46,24 @@ def run(request, monkeypatch, capsys):
 
 
 @pytest.fixture(scope="session")
-def browser():
-    """Debian's Chromium as a Playwright Browser; where CI is set it must be there, elsewhere it may lack."""
+def without_tool():
+    """Leaves a test out that needs a tool beside Python and Rust, or fails it where all must be there."""
+    return pytest.fail if os.environ.get("POLYPOD_ALL_TOOLS") else pytest.skip
+
+
+@pytest.fixture(scope="session")
+def browser(without_tool):
+    """Debian's Chromium as a Playwright Browser; it may lack where `make tools` does not work."""
     try:
         from playwright.sync_api import sync_playwright
     except ImportError as error:
-        _without_browser(f"Playwright is not installed ({error})")
+        without_tool(f"no browser: Playwright is not installed ({error})")
     if not CHROMIUM.is_file():
-        _without_browser(f"{CHROMIUM} is not there; on Debian: apt-get install chromium")
+        without_tool(f"no browser: {CHROMIUM} is not there; on Debian: apt-get install chromium")
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=str(CHROMIUM), args=[*_QUIET])
         yield browser
         browser.close()
-
-
-def _without_browser(reason: str) -> None:
-    (pytest.fail if os.environ.get("CI") else pytest.skip)(f"no browser: {reason}")
 
 
 @dataclass
