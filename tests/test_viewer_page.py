@@ -26,7 +26,7 @@ from polypod.viewer.static import write_static
 
 NAME = "lu-3spu-2rpu-r"
 DATA = Path(__file__).parent / "data"
-PATIENCE = 60_000
+PATIENCE = 180_000
 """For a page on a busy machine without a graphics card, ms."""
 
 
