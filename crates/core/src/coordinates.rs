@@ -584,7 +584,7 @@ impl<V: Lanes> Following<V> {
         mech: &Mechanism<Dual<f64>>,
         set: &Set<Dual<f64>>,
         q: &Values<Jet<V>>,
-        given: &[bool; MAX_COORDINATES],
+        given: &[bool],
     ) -> Self {
         let dependent = Dependent::of(set, given);
         let mut unit = [[V::zero(); MAX_CONSTRAINTS]; MAX_CONSTRAINTS];

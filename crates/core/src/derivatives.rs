@@ -5,7 +5,7 @@
 //! what it is off by, per unit of the direction, the forces must answer.
 
 use crate::constraint;
-use crate::coordinates::{self, Following, MAX_COORDINATES, Set, Values, Variation, Varying};
+use crate::coordinates::{self, Following, Set, Values, Variation, Varying};
 use crate::dynamics::{Answering, leg_wrench, load_in_base, own_wrench};
 use crate::geometry::{self, Parameter};
 use crate::lanes::Lanes;
@@ -168,7 +168,7 @@ impl<V: Lanes> Coordinates<V> {
         mech: &Mechanism,
         set: &Set,
         still: &Varied,
-        given: &[bool; MAX_COORDINATES],
+        given: &[bool],
         platform: &Motion<V>,
     ) -> Self {
         let q = coordinates::along(mech, set, platform);

@@ -143,14 +143,6 @@ impl<V: Ordered> Constant<Dual<V>> for Dual<f64> {
     }
 }
 
-/// The same in any direction that the outer number differentiates by.
-impl<V: Ordered> Constant<Dual<Dual<V>>> for Dual<f64> {
-    #[inline(always)]
-    fn lift(self) -> Dual<Dual<V>> {
-        Dual::new(self.lift(), Dual::zero())
-    }
-}
-
 /// At rest along a motion.
 impl<V: Ordered> Constant<Jet<Dual<V>>> for Dual<f64> {
     #[inline(always)]

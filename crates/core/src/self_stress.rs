@@ -276,13 +276,14 @@ impl<'a, V: Lanes> Solver<'a, V> {
                 let stress = self.choice.stresses[s * self.joints.len() + j];
                 let parts = pure(stress, length).array();
                 let seen_parts = pure(self.places[j].seen(stress), length).array();
+                // The root of the sum is the most that a self-stress of size one can have, whatever the basis.
                 for k in 0..6 {
-                    base[k] = base[k].most(parts[k].abs());
-                    seen[k] = seen[k].most(seen_parts[k].abs());
+                    base[k] = parts[k].mul_add(parts[k], base[k]);
+                    seen[k] = seen_parts[k].mul_add(seen_parts[k], seen[k]);
                 }
             }
             for k in 0..6 {
-                let (one, zero, open) = (V::one(), V::zero(), V::lit(OPEN));
+                let (one, zero, open) = (V::one(), V::zero(), V::lit(OPEN * OPEN));
                 self.determinate[j][k] = V::select(base[k].at_most(open), one, zero);
                 self.determinate_in_joint[j][k] = V::select(seen[k].at_most(open), one, zero);
             }
