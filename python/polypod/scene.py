@@ -22,7 +22,7 @@ from polypod.solids import four_sided, tube
 from polypod.style import INK
 
 Array = NDArray[np.float64]
-Inside = Callable[[Array], NDArray[np.bool_]]
+DrawnOut = Callable[[Array], tuple[Array, NDArray[np.bool_]]]
 
 LIGHT = np.array([-0.35, -0.55, 0.76])
 """Direction towards the light, base axes."""
@@ -35,13 +35,21 @@ def _moved(points: Array, place: Array) -> Array:
     return np.asarray(points @ place[:3, :3].T + place[:3, 3])
 
 
-def _inside(cylinder: Link, place: Array, corners: Array) -> NDArray[np.bool_]:
-    """Which faces (k, 4, 3), in axes that stand at `place` in the cylinder's, lie inside its barrel."""
+def _drawn_out(cylinder: Link, place: Array, corners: Array) -> tuple[Array, NDArray[np.bool_]]:
+    """A piston's faces (k, 4, 3), in axes at `place` in the cylinder's, ended at the barrel's mouth.
+
+    And which of them are left; of the cylinder's own faces only that.
+    """
     barrel = next(piece.mesh for piece in cylinder.pieces if piece.name == "barrel")
     (_, low, _), (radius, high, _) = barrel.bounds
     at = _moved(corners, place)
     within = (np.hypot(at[..., 0], at[..., 2]) < 0.9 * radius) & (low < at[..., 1]) & (at[..., 1] <= high)
-    return np.asarray(within.all(axis=1))
+    left = ~within.all(axis=1)
+    if np.array_equal(place, np.eye(4)):
+        return corners, left
+    at[..., 1] = np.where(within, high, at[..., 1])
+    back = np.asarray(np.linalg.inv(place), np.float64)
+    return _moved(at, back), left
 
 
 class _JointLabel(NamedTuple):
@@ -71,13 +79,13 @@ class Faces:
         self._colors: list[Array] = []
 
     def add(
-        self, mesh: Trimesh, color: str, place: Array | None = None, inside: Inside | None = None
+        self, mesh: Trimesh, color: str, place: Array | None = None, drawn_out: DrawnOut | None = None
     ) -> None:
-        """The faces of a body in axes that stand at `place` (4, 4), but for those that `inside` tells of."""
+        """The faces of a body in axes that stand at `place` (4, 4), as far as they are drawn out."""
         place = np.eye(4) if place is None else place
         corners, normals = four_sided(mesh)
-        if inside is not None:
-            shown = ~inside(corners)
+        if drawn_out is not None:
+            corners, shown = drawn_out(corners)
             corners, normals = corners[shown], normals[shown]
         self._corners.append(_moved(corners, place))
         self._normals.append(normals @ place[:3, :3].T)
@@ -145,11 +153,12 @@ class Scene:
                 continue  # a leg without length, which has no direction
             # A piston comes right after its cylinder.
             cylinder = {"cylinder": k, "piston": k - 1}.get(link.kind)
-            inside = None
+            drawn_out = None
             if cylinder is not None:
-                inside = partial(_inside, links[cylinder], np.linalg.inv(frames[cylinder]) @ place)
+                within = np.eye(4) if cylinder == k else np.linalg.inv(frames[cylinder]) @ place
+                drawn_out = partial(_drawn_out, links[cylinder], within)
             for piece in link.pieces:
-                self.faces.add(piece.mesh, piece.color, place, inside)
+                self.faces.add(piece.mesh, piece.color, place, drawn_out)
 
     def _rod_label(self, rod: dict[str, Any], points: Array, thick: float) -> None:
         axis, start = np.array(rod["axis"]), np.array(rod["point"])
