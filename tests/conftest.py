@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+import polypod as pp
 from polypod import cli
 
 CHROMIUM = Path("/usr/bin/chromium")
@@ -40,6 +41,26 @@ def run(request, monkeypatch, capsys):
         return exit.value.code or 0, out, err
 
     return run
+
+
+@pytest.fixture(scope="session")
+def tricept():
+    """Makes a Tricept: three UPS legs around a passive UPF post of that name; no strokes."""
+    data = pp.load(Path(__file__).parent / "data" / "stewart-gough.toml").to_dict()
+    data.pop("published", None)
+    arms = [
+        {
+            "base": {"joint": "U", "point": {"radius": 500, "angle": angle}, "axis": {"angle": angle + 90}},
+            "platform": {"joint": "S", "point": {"radius": 200, "angle": angle}},
+        }
+        for angle in (90, 210, 330)
+    ]
+    post = {
+        "actuated": False,
+        "base": {"joint": "U", "point": [0, 0, 0], "axis": [1, 0, 0]},
+        "platform": {"joint": "F", "point": [0, 0, 0], "axis": [0, 0, 1], "normal": [0, 1, 0]},
+    }
+    return lambda name="post": pp.Mechanism.from_dict({**data, "legs": [*arms, {"name": name, **post}]})
 
 
 # --- pages in a real browser --------------------------------------------------------------------------------

@@ -68,7 +68,7 @@ def test_joints_look_like_what_they_are(mech):
             assert links[link] & {"ball", "pin", "block"} == on_leg
 
 
-def test_a_fixed_joint_is_a_block_and_a_universal_one_has_a_pin_on_its_body():
+def test_a_fixed_joint_is_a_block_and_a_universal_one_has_a_pin_on_its_body(tricept):
     mech = tricept()
     base, *_, platform = links_of(mech)
     assert [part.name for part in base.pieces if part.name.startswith("pin")] == [
@@ -157,26 +157,6 @@ def test_a_leg_whose_turn_the_core_does_not_tell_stands_somehow():
     legs = mech.inverse_kinematics(mech.home)
     np.testing.assert_allclose(rotations[1:-1:2, :, 1], legs.directions)
     np.testing.assert_allclose(found.frames[2:-1:2, :3, 3] - found.frames[1:-1:2, :3, 3], legs.vectors)
-
-
-def tricept():
-    """Three UPS legs around a passive UPF post; no strokes."""
-    data = pp.load(DATA / "stewart-gough.toml").to_dict()
-    data.pop("published", None)
-    arms = [
-        {
-            "base": {"joint": "U", "point": {"radius": 500, "angle": angle}, "axis": {"angle": angle + 90}},
-            "platform": {"joint": "S", "point": {"radius": 200, "angle": angle}},
-        }
-        for angle in (90, 210, 330)
-    ]
-    post = {
-        "name": "post",
-        "actuated": False,
-        "base": {"joint": "U", "point": [0, 0, 0], "axis": [1, 0, 0]},
-        "platform": {"joint": "F", "point": [0, 0, 0], "axis": [0, 0, 1], "normal": [0, 1, 0]},
-    }
-    return pp.Mechanism.from_dict({**data, "legs": [*arms, post]})
 
 
 @pytest.mark.parametrize("normal", [[0.0, 0.0, 1.0], [0.6, 0.0, 0.8]])

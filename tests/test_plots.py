@@ -184,24 +184,8 @@ def test_leg_names_of_any_kind_are_drawn(tmp_path):
     plots.save_figure(plots.plot_fig4(solve_some(mech, z=0.5, rx=0.0, ry=0.0)), tmp_path / "f.png")
 
 
-def test_passive_leg_with_a_fixed_joint(tmp_path):
-    """A Tricept: three UPS legs around a passive UPF post."""
-    data = pp.load(FILES[2]).to_dict()
-    del data["published"]
-    arms = [
-        {
-            "base": {"joint": "U", "point": {"radius": 500, "angle": angle}, "axis": {"angle": angle + 90}},
-            "platform": {"joint": "S", "point": {"radius": 200, "angle": angle}},
-        }
-        for angle in (90, 210, 330)
-    ]
-    post = {
-        "name": "post",
-        "actuated": False,
-        "base": {"joint": "U", "point": [0, 0, 0], "axis": [1, 0, 0]},
-        "platform": {"joint": "F", "point": [0, 0, 0], "axis": [0, 0, 1], "normal": [0, 1, 0]},
-    }
-    mech = pp.Mechanism.from_dict({**data, "legs": [*arms, post]})
+def test_passive_leg_with_a_fixed_joint(tricept, tmp_path):
+    mech = tricept()
     plots.save_figure(plots.plot_mechanism(mech).figure, tmp_path / "m.png")
     ax = plots.plot_topology(mech.mobility())
     assert "piston post" not in [text.get_text() for text in ax.texts]

@@ -156,23 +156,8 @@ def test_a_pose_of_another_mode_is_no_answer(model, monkeypatch):
     np.testing.assert_array_equal(model.pose, pose)
 
 
-def test_a_passive_leg_follows():
-    data = pp.load(DATA / "stewart-gough.toml").to_dict()
-    data.pop("published", None)
-    arms = [
-        {
-            "base": {"joint": "U", "point": {"radius": 500, "angle": angle}, "axis": {"angle": angle + 90}},
-            "platform": {"joint": "S", "point": {"radius": 200, "angle": angle}},
-        }
-        for angle in (90, 210, 330)
-    ]
-    post = {
-        "name": "<b>post</b>",
-        "actuated": False,
-        "base": {"joint": "U", "point": [0, 0, 0], "axis": [1, 0, 0]},
-        "platform": {"joint": "F", "point": [0, 0, 0], "axis": [0, 0, 1], "normal": [0, 1, 0]},
-    }
-    mech = pp.Mechanism.from_dict({**data, "legs": [*arms, post]})
+def test_a_passive_leg_follows(tricept):
+    mech = tricept("<b>post</b>")
     model = Model(mech)
     assert model.set_coordinate(model.names[0], 0.05 if model.names[0] != "z" else 0.61)
     assert not model.set_length(3, 0.7)

@@ -23,9 +23,7 @@ from polypod.errors import PolypodError, ShapeError
 from polypod.mechanism import Mechanism
 from polypod.results import Solution
 from polypod.scene import Scene, draw, frame, joint_handles, math_name
-from polypod.series import Panel as Panel
-from polypod.series import draw_panel, pyplot_figure, stroke_of
-from polypod.series import in_kilo as in_kilo
+from polypod.series import Panel, draw_panel, in_kilo, pyplot_figure, stroke_of
 from polypod.series import plot_series as plot_series
 from polypod.status import Status, count
 from polypod.style import BLUE, GREY, INK, house_style

@@ -8,11 +8,12 @@ from numpy.typing import NDArray
 
 from polypod.actuators import leg_power
 from polypod.mechanism import Mechanism
-from polypod.plots import Panel, fig4_panels, in_kilo
+from polypod.plots import fig4_panels
 from polypod.report.charts import Chart
 from polypod.report.reactions import Reactions, families
 from polypod.results import Solution
 from polypod.scene import math_name
+from polypod.series import Panel, in_kilo
 from polypod.singularity import NEAR_SINGULAR
 from polypod.status import Status
 from polypod.units import coordinate_unit
