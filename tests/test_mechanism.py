@@ -319,7 +319,7 @@ def test_a_file_that_is_no_utf_8_is_named(tmp_path: Path) -> None:
 def test_a_missing_file_brings_up_the_likeliest_name(tmp_path: Path) -> None:
     with pytest.raises(UnknownNameError, match=f'"lu-3spu-2rpu"; did you mean "{BUILT_IN}"'):
         pp.load("lu-3spu-2rpu")
-    with pytest.raises(UnknownNameError, match=f"nowhere.toml.*valid: {BUILT_IN}"):
+    with pytest.raises(UnknownNameError, match=f"nowhere.toml.*valid: .*{BUILT_IN}"):
         pp.load(tmp_path / "nowhere.toml")
 
 

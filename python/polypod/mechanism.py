@@ -57,6 +57,7 @@ from polypod.singularity import (
     Determinant,
     Singularity,
     SingularityDistance,
+    SingularityKind,
     codes,
 )
 from polypod.status import Status
@@ -218,6 +219,11 @@ class Mechanism:
                 f"{mobility.uncontrolled} of its freedoms at every pose, so that forces and velocities are "
                 "not determined anywhere."
             )
+        elif self._loses_constraints:
+            notes.append(
+                f"singular at its centre pose, or nearly so; {SingularityKind.CONSTRAINT.message}. "
+                "Forces there are not determined or large; stay clear of it."
+            )
         elif not sigma.sigma_min > NEAR_SINGULAR:
             notes.append(
                 "nearly singular at its centre pose: the smallest singular value is "
@@ -234,7 +240,7 @@ class Mechanism:
             several = mobility.redundant > 1
             notes.append(
                 f"{mobility.redundant} redundant constraint{'s couple' if several else ' couples'} legs "
-                f"{' and '.join(mobility.redundant_legs)}: the parts must be made accurately, and couples in "
+                f"{_in_words(mobility.redundant_legs)}: the parts must be made accurately, and couples in "
                 "these joints are statically indeterminate."
             )
         if mobility.passive:
@@ -243,6 +249,12 @@ class Mechanism:
                 f"({mobility.passive} passive freedoms)."
             )
         return notes
+
+    @property
+    def _loses_constraints(self) -> bool:
+        """Whether the centre pose is a constraint singularity, or near one."""
+        kind = int(self.singularity(self.home, tolerance=NEAR_SINGULAR).kind)
+        return kind in (SingularityKind.CONSTRAINT, SingularityKind.CONSTRAINT_VANISHES)
 
     def mobility(self) -> Mobility:
         """Freedoms, joints, redundant constraints and passive freedoms from generic ranks [Eq. 1, T18]."""
@@ -1144,6 +1156,11 @@ class Mechanism:
 def _by_name(names: Sequence[str], rows: Array) -> dict[str, Array]:
     """The last axis by names; numbers for a single state."""
     return {name: rows[..., i][()] for i, name in enumerate(names)}
+
+
+def _in_words(names: Sequence[str]) -> str:
+    """1 and 3; 1, 2 and 3."""
+    return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
 
 
 def _plain(value: Any) -> Any:
