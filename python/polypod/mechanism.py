@@ -6,6 +6,7 @@ import copy
 import json
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from functools import cached_property
 from importlib.resources import files
 from pathlib import Path
@@ -50,6 +51,7 @@ from polypod.errors import (
     WorkspaceError,
     alternatives,
 )
+from polypod.lines import line_of
 from polypod.schema import read_spec
 from polypod.singularity import (
     NEAR_SINGULAR,
@@ -89,9 +91,11 @@ class Mechanism:
         try:
             self._core = _core.Mechanism(json.dumps(spec))
         except _core.Faults as error:
-            raise MechanismError([*faults, *(Fault(*f) for f in error.args[0])], origin) from None
+            raise MechanismError(
+                _found([*faults, *(Fault(*f) for f in error.args[0])], text), origin
+            ) from None
         if faults:
-            raise MechanismError(faults, origin)
+            raise MechanismError(_found(faults, text), origin)
         self._spec = spec
         legs = spec["legs"]
         self.name: str = spec["name"]
@@ -1156,6 +1160,11 @@ class Mechanism:
 def _by_name(names: Sequence[str], rows: Array) -> dict[str, Array]:
     """The last axis by names; numbers for a single state."""
     return {name: rows[..., i][()] for i, name in enumerate(names)}
+
+
+def _found(faults: Sequence[Fault], text: str | None) -> list[Fault]:
+    """The faults with their lines in the text."""
+    return [fault if text is None else replace(fault, line=line_of(text, fault.place)) for fault in faults]
 
 
 def _in_words(names: Sequence[str]) -> str:
