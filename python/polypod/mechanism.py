@@ -91,9 +91,8 @@ class Mechanism:
         try:
             self._core = _core.Mechanism(json.dumps(spec))
         except _core.Faults as error:
-            raise MechanismError(
-                _found([*faults, *(Fault(*f) for f in error.args[0])], text), origin
-            ) from None
+            faults += [Fault(*fault) for fault in error.args[0]]
+            raise MechanismError(_found(faults, text), origin) from None
         if faults:
             raise MechanismError(_found(faults, text), origin)
         self._spec = spec

@@ -13,7 +13,7 @@ TEMPLATE = "template.toml"
 
 
 def starting_text(path: Path, like: str | None = None) -> str:
-    """The text of a new mechanism file: the template, or the built-in mechanism `like`, under the file's name.
+    """The text of a new mechanism file: the template or a built-in one, under the name of the file.
 
     Raises:
         UnknownNameError: no such built-in mechanism.

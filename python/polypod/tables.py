@@ -145,12 +145,9 @@ def coupled_table(facts: Facts) -> Table:
             changes = (f"{n} {_signed(c, coordinate_unit(n))}" for n, c in row["follow"].items())
             follow = ", ".join(changes) or "nothing"
         rows.append((moved, _signed(row["change"], coordinate_unit(moved)), follow))
-    note = (
-        "" if not rows else "The other independent coordinates stay; turns are those of the rotation vector."
-    )
-    return Table(
-        "Freedoms: independent coordinates, and what follows", ("moved", "by>", "follow"), rows, note
-    )
+    note = "The other independent coordinates stay where they are." if rows else ""
+    headers = ("moved", "by>", "follow")
+    return Table("Freedoms: independent coordinates, and what follows", headers, rows, note)
 
 
 def _vector(values: Sequence[float], digits: int, factor: float = 1.0) -> str:

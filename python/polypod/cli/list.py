@@ -5,7 +5,7 @@ from __future__ import annotations
 import typer
 from rich.markup import escape
 
-from polypod.cli.shared import JsonOption, console, new_table, print_json
+from polypod.cli.shared import JsonOption, console, print_json
 
 app = typer.Typer()
 
@@ -19,12 +19,8 @@ def list_(as_json: JsonOption = False) -> None:
     if as_json:
         print_json(facts)
         return
-    table = new_table("Built-in mechanisms", "name", "legs", "freedoms>", "")
+    names, legs = (max(len(mechanism[key]) for mechanism in facts) for key in ("name", "legs"))
     for mechanism in facts:
-        table.add_row(
-            escape(mechanism["name"]),
-            mechanism["legs"],
-            str(mechanism["dof"]),
-            escape(mechanism["description"]),
-        )
-    console().print(table)
+        words = f"{mechanism['legs']:{legs}}  {mechanism['dof']} freedoms  {mechanism['description']}"
+        # A line each, however narrow the terminal: for eyes and for grep.
+        console().print(f"[bold]{mechanism['name']:{names}}[/bold]  {escape(words)}", soft_wrap=True)
