@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import re
+import subprocess
 import sys
 from functools import cache
 from pathlib import Path
@@ -15,12 +17,15 @@ from numpy.typing import NDArray
 import polypod as pp
 from polypod import SingularityKind, Status
 from polypod.errors import UnsupportedError
+from polypod.summary import catalogue
 
 sys.path.insert(0, str(Path(__file__).parent))
 
 Array = NDArray[np.float64]
 
 SEED = 20001
+ROW = r"^\| \[`([\w-]+)`\]\(#[\w-]+\) \| (\S+) \| (\d) \|"
+"""Of the table of the page: name, legs, freedoms."""
 POSES = 6
 REACH = 0.15
 """How far random coordinates go from home: radians, and parts of the characteristic length."""
@@ -358,3 +363,32 @@ def test_info_of_all(run, name: str) -> None:
     assert (status, err) == (0, "")
     facts = json.loads(out, parse_constant=pytest.fail)
     assert facts["mobility"]["dof"] == KNOWN[name].dof
+
+
+# --- the page -----------------------------------------------------------------------------------------------
+
+
+def test_the_page_has_every_mechanism_and_its_drawing() -> None:
+    from pages import DOCS, read
+
+    page = read(DOCS / "catalogue.md")
+    shown = set(re.findall(r"\(images/catalogue/([\w-]+)\.png\)", page))
+    kept = {path.stem for path in (DOCS / "images" / "catalogue").iterdir()}
+    rows = {name: (legs, int(dof)) for name, legs, dof in re.findall(ROW, page, flags=re.MULTILINE)}
+    facts = {row["name"]: (row["legs"], row["dof"]) for row in catalogue()}
+    assert rows == facts
+    assert kept == set(KNOWN)
+    assert shown == kept - {"4sps-upu"}, "that one looks as 4ups-upu does"
+    assert f"\n{len(KNOWN)}\n" in page
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", KNOWN)
+def test_drawings_are_kept_up(name: str, tmp_path: Path) -> None:
+    from pages import DOCS
+    from PIL import Image
+
+    made, kept = tmp_path / f"{name}.png", DOCS / "images" / "catalogue" / f"{name}.png"
+    subprocess.run([sys.executable, DOCS / "catalogue.py", name, "-o", tmp_path], check=True, timeout=120)
+    grey = [np.asarray(Image.open(p).convert("L").resize((64, 64)), dtype=float) / 255 for p in (made, kept)]
+    assert abs(grey[0] - grey[1]).max() < 0.15, "make gallery has not been run"
