@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import argparse
-import importlib.util
 from pathlib import Path
 
+from gallery import save
 from matplotlib.figure import Figure
 
 import polypod as pp
@@ -31,13 +31,9 @@ def main() -> None:
     parser.add_argument("names", nargs="*", metavar="NAME", help="all by default")
     parser.add_argument("-o", "--output", type=Path, default=IMAGES, help="the folder for them")
     chosen = parser.parse_args()
-    spec = importlib.util.spec_from_file_location("gallery", DOCS / "gallery.py")
-    assert spec is not None and spec.loader is not None
-    gallery = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(gallery)
     chosen.output.mkdir(parents=True, exist_ok=True)
     for name in chosen.names or pp.list_mechanisms():
-        gallery.save(drawing(name), chosen.output / f"{name}.png")
+        save(drawing(name), chosen.output / f"{name}.png")
 
 
 if __name__ == "__main__":

@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from PIL import Image
 
 import polypod as pp
 from polypod import SingularityKind, Status
@@ -20,6 +21,8 @@ from polypod.errors import UnsupportedError
 from polypod.summary import catalogue
 
 sys.path.insert(0, str(Path(__file__).parent))
+
+from pages import DOCS, read
 
 Array = NDArray[np.float64]
 
@@ -255,6 +258,15 @@ def test_griffis_duffy_is_singular_everywhere() -> None:
         mech.base_parameters()
 
 
+@pytest.mark.xfail(strict=True, reason="forward kinematics says NOT_CONVERGED away from the guess")
+def test_forward_kinematics_of_griffis_duffy_names_the_singularity() -> None:
+    """From a guess beside the pose: the lengths leave a curve of poses, whichever of them is found."""
+    mech = load("griffis-duffy")
+    pose, *_ = sampled("griffis-duffy")
+    found = mech.forward_kinematics(mech.inverse_kinematics(pose).lengths, beside(mech, pose))
+    assert set(found.status.tolist()) == {Status.SINGULAR}
+
+
 def test_snu_is_loose_at_its_centre() -> None:
     mech = load("3-upu-snu")
     found = mech.singularity(mech.home)
@@ -307,6 +319,26 @@ def test_octahedral_example() -> None:
     assert abs(modes.pose[:, 0, 3] + 2 / 5).max() < 1e-12
     heights = np.sort(modes.pose[:, 2, 3])
     assert heights == pytest.approx(-heights[::-1], abs=1e-12), "the base is a mirror"
+
+
+def test_octahedral_eliminant() -> None:
+    """Its printed coefficients, by a search for all complex poses with equations of its own."""
+    import test_forward
+
+    printed = {  # power of the third corner's height: coefficient
+        14: (233520143876274504789, 242177763763360000),
+        12: (7255016240942576514134370463827, 34830199726657445888000000),
+        10: (-6135855545804589799118335658802661631, 445826556501215307366400000000),
+        8: (-815801522057339831032333444255677424613211, 365221115085795579794554880000000),
+        6: (2893043016821964206280419999396021687312902961, 584353784137272927671287808000000000),
+    }
+    mech, lengths = load("octahedral-3-3"), np.array([6.0, 12.0, 7.0, 11.0, 9.0, 13.0])
+    poses = test_forward.search(mech, lengths, 600, np.random.default_rng(SEED), over=complex)
+    assert len(poses) == 16
+    corner = np.array(mech.geometry["legs"][4]["platform"]["point"])
+    coefficients = np.poly(poses[:, 2, :3] @ corner + poses[:, 2, 3])
+    for power, (numerator, denominator) in printed.items():
+        assert coefficients[16 - power] == pytest.approx(numerator / denominator, rel=1e-8)
 
 
 def test_griffis_duffy_lengths() -> None:
@@ -369,8 +401,6 @@ def test_info_of_all(run, name: str) -> None:
 
 
 def test_the_page_has_every_mechanism_and_its_drawing() -> None:
-    from pages import DOCS, read
-
     page = read(DOCS / "catalogue.md")
     shown = set(re.findall(r"\(images/catalogue/([\w-]+)\.png\)", page))
     kept = {path.stem for path in (DOCS / "images" / "catalogue").iterdir()}
@@ -385,9 +415,6 @@ def test_the_page_has_every_mechanism_and_its_drawing() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", KNOWN)
 def test_drawings_are_kept_up(name: str, tmp_path: Path) -> None:
-    from pages import DOCS
-    from PIL import Image
-
     made, kept = tmp_path / f"{name}.png", DOCS / "images" / "catalogue" / f"{name}.png"
     subprocess.run([sys.executable, DOCS / "catalogue.py", name, "-o", tmp_path], check=True, timeout=120)
     grey = [np.asarray(Image.open(p).convert("L").resize((64, 64)), dtype=float) / 255 for p in (made, kept)]
