@@ -14,11 +14,12 @@ import pytest
 
 import polypod as pp
 from polypod.actuators import leg_power, requirements, rms_over_time
-from polypod.report import reactions as reactions_module
 from polypod.report.decimate import POINTS, kept, spans
 from polypod.report.formulas import to_html
-from polypod.report.reactions import reactions_along
+from polypod.report.reactions import reactions_along, reactions_table
+from polypod.solution import CHUNK
 from polypod.summary import summarise
+from polypod.tables import fixed
 
 NAME = "lu-3spu-2rpu-r"
 ROOT = Path(__file__).parents[1]
@@ -186,15 +187,19 @@ def test_reactions_are_those_of_solve(mech, motion):
     assert found.undetermined.any()
 
 
-def test_of_a_long_motion_some_reactions_are_looked_at(mech, solution, monkeypatch):
-    monkeypatch.setattr(reactions_module, "STATES", 100)
+def test_a_state_of_a_long_motion_has_the_reactions_that_it_has_alone(mech):
+    """Beyond one chunk, too: the table's peaks are those of all states."""
+    motion = pp.load_motion(NAME, mech).sample(np.linspace(0.0, 8.0, CHUNK + 1003))
+    solution = pp.solve(mech, motion)
     found = reactions_along(mech, solution)
-    assert 50 <= len(found.time) < 200
-    force = solution.dataset["force"].to_numpy()
-    peak = solution.dataset["time"].to_numpy()[np.argmax(np.abs(force).max(axis=1))]
-    assert peak in found.time
-    table = reactions_module.reactions_table(found)
-    assert len(table.rows) == len(mech.joint_list)
+    data = solution.dataset
+    motions = (data[name].to_numpy() for name in ("pose", "twist", "acceleration", "wrench"))
+    whole = mech.joint_reactions(*motions, data.attrs["wrench_axes"]).reactions
+    assert np.array_equal(found.time, data["time"].to_numpy())
+    assert np.array_equal(found.force, np.linalg.norm(whole[..., :3], axis=-1))
+    assert np.array_equal(found.torque, np.linalg.norm(whole[..., 3:], axis=-1))
+    table = reactions_table(found)
+    assert [row[3] for row in table.rows] == [fixed(peak) for peak in found.force.max(axis=0)]
 
 
 # --- the page -----------------------------------------------------------------------------------------------

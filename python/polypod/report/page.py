@@ -172,7 +172,6 @@ def _motion(mech: Mechanism, along: Along, series: Series) -> dict[str, Any]:
         "actuator_charts": shown(groups.actuator_charts(mech, solution)),
         "reactions": reactions_table(along.reactions),
         "reaction_charts": shown(groups.reaction_charts(mech, along.reactions)),
-        "looked_at": (len(along.reactions.time), along.reactions.of),
         "undetermined": bool(along.reactions.undetermined.any()),
         "singularity_charts": shown(groups.singularity_charts(mech, solution)),
         "legs": [(name, shown(groups.leg_charts(data, i))) for i, name in enumerate(mech.leg_names)],
