@@ -103,6 +103,15 @@ def test_fig4_of_a_mechanism_without_rod_shows_its_constraints():
     assert labels_of(axes[11]) == [r"$\sigma_\mathrm{min}$"]
 
 
+@pytest.mark.parametrize(("kinds", "unit"), [("BBE", "N"), ("DDD", "N m"), ("ADE", "N or N m")])
+def test_multipliers_have_the_unit_of_their_kind(kinds, unit):
+    """All but those of kind D are those of a length: forces."""
+    mech = pp.load(FILES[1])
+    data = solve_some(mech, z=0.5, rx=0.0, ry=0.0).dataset
+    rows = [f"{kind} of leg {i + 1}" for i, kind in enumerate(kinds)]
+    assert plots.fig4_panels(data.assign_coords(constraint_row=rows))[10].unit == unit
+
+
 def test_fig4_of_a_mechanism_without_constraints_shows_power():
     mech = pp.load(FILES[2])
     axes = plots.plot_fig4(solve_some(mech, x=0.0, y=0.0, z=0.6, rx=0.0, ry=0.0, rz=0.0)).axes

@@ -260,9 +260,9 @@ def _second_forces(data: xr.Dataset) -> Panel:
     if "constraint" in data:
         values = data["constraint"].to_numpy()
         curves = tuple(f"$f_{{c,{i + 1}}}$" for i in range(values.shape[1]))
-        # Kind A-E stands first; D keeps the angle between two directions, E compares two legs' moments.
+        # Kind A-E stands first; D keeps the angle between two directions, all others a length [T9].
         kinds = [str(row)[0] for row in data["constraint_row"].to_numpy()]
-        units = {{"D": "N m", "E": "N m$^{-1}$"}.get(kind, "N") for kind in kinds}
+        units = {"N m" if kind == "D" else "N" for kind in kinds}
         return Panel("constraint $f_c$", " or ".join(sorted(units)), values, curves)
     return in_kilo(Panel("actuator power", "W", data["actuator_power"].to_numpy()[:, None], ("$P$",)))
 
