@@ -221,8 +221,27 @@ def test_a_report_without_motion(name):
     assert 'id="actuators"' not in html
     assert "Table I" not in html
     assert not outside(html)
-    # This one's start is no node of the default grid: the page says so, instead of an error.
-    assert ("None was found" in html) == (name == "3-rps")
+    # The o of this one does not move freely in space: its workspace is one of its own coordinates.
+    assert ("All values that z, rx and ry can take together" in html) == (name == "3-rps")
+    assert ('id="space"' in html) == (name != "3-rps")
+
+
+def test_a_slice_in_a_report_is_told_as_one(mech):
+    """Angles are not drawn in space, as if they were lengths."""
+    tilts = mech.workspace(["azimuth", "tilt"], {"x": 0.0, "y": 0.1, "z": 0.7}, step=0.2)
+    html = pp.report_html(mech, workspace=tilts)
+    assert "All values that azimuth and tilt can take together inside all limits at x = 0.0 mm" in html
+    assert 'id="space"' not in html
+    reach = mech.workspace(["x", "y", "z"], {"alpha": 0.1, "beta": 0.6}, step=0.1)
+    assert 'id="space"' in pp.report_html(mech, workspace=reach)
+
+
+def test_a_report_says_why_it_has_no_workspace():
+    data = pp.load(DATA / "3-rps.toml").to_dict()
+    for leg in data["legs"]:
+        del leg["stroke"]
+    html = pp.report_html(pp.Mechanism.from_dict(data))
+    assert "None was found: bounds.x: 3-rps has no strokes that bound it" in html
 
 
 @pytest.mark.parametrize("rows", [1, 2, 3])

@@ -60,10 +60,10 @@ def poses_picture(mech: Mechanism, solution: Solution) -> Picture | None:
 
 
 def workspace_picture(workspace: Workspace) -> Picture:
-    """Views of a workspace along the axes."""
+    """Views of a workspace along the axes, or its outline."""
     figure = Figure(figsize=(8.0, 7.4))
     plot_workspace(workspace, figure)
-    return Picture(_address(figure), "The reachable workspace from above, from the side and from the front")
+    return Picture(_address(figure), f"The workspace in {', '.join(workspace.names)}")
 
 
 def _address(figure: Figure) -> str:

@@ -25,7 +25,7 @@ from polypod.report.decimate import POINTS, spans
 from polypod.report.inputs import MotionSource, versions
 from polypod.report.reactions import reactions_table
 from polypod.report.space import workspace_figure
-from polypod.report.words import actuators_table, glance, outcomes, warnings
+from polypod.report.words import actuators_table, glance, outcomes, warnings, workspace_words
 from polypod.results import replacing
 from polypod.workspace import Workspace
 
@@ -185,9 +185,11 @@ def _workspace(content: Content) -> dict[str, Any]:
         return {"why": content.no_workspace}
     path = None if content.along is None else path_of_o(content.along.solution)
     facts = found.facts()
+    of_o = found.names == ("x", "y", "z")
     return {
         "why": "",
-        "figure": json.loads(workspace_figure(found, path)),
+        "words": workspace_words(facts),
+        **({"figure": json.loads(workspace_figure(found, path))} if of_o else {}),
         "picture": figures.workspace_picture(found),
         "extents": tables.extents_table(facts),
         "ends": tables.ends_table(facts),
