@@ -107,6 +107,21 @@ def test_passive_legs_are_no_actuators():
     assert [row["leg"] for row in requirements(tripod, pp.solve(tripod, path))] == ["1", "2", "3"]
 
 
+def test_small_peaks_keep_their_figures_and_no_zero_is_negative():
+    """A planar mechanism, whose actuators carry no weight."""
+    planar = pp.load(ROOT / "docs" / "mechanisms" / "planar.toml")
+    path = pp.Motion.through([0.0, 4.0], {"x": [0, 0.01], "y": [0, 0.01], "rz": [0.52, 0.6]}, set="pose")
+    solution = pp.solve(planar, path.sample(np.linspace(0.0, 4.0, 21)))
+    html = pp.report_html(planar, solution, workspace=False)
+    glance = dict(re.findall(r"<dt>(.*?)</dt><dd>(.*?)</dd>", html))
+    peak, unit = glance["peak force"].split()
+    largest = float(np.max(np.abs(solution.dataset["force"].to_numpy())))
+    assert unit == "N"
+    assert float(peak) == pytest.approx(largest, rel=5e-3)
+    assert 0.0 < largest < 0.5
+    assert ">-0.0<" not in html
+
+
 # --- fewer points -------------------------------------------------------------------------------------------
 
 

@@ -181,6 +181,45 @@ def test_the_workspace_can_be_seen_through(show, paper):
     page.wait_for_function(f"{opacity}[0] < 0.5")
 
 
+LABELS = """() => [...document.querySelectorAll(".chart .plot")].filter((node) => node.layout).map((node) => {
+  const box = (it) => it.getBoundingClientRect();
+  const picture = box(node.querySelector(".main-svg")), title = box(node.querySelector(".ytitle"));
+  const ticks = [...node.querySelectorAll(".ytick text")].map(box);
+  return {
+    label: node.layout.yaxis.title.text,
+    outside: Math.max(picture.top - title.top, title.bottom - picture.bottom, picture.left - title.left),
+    over: Math.max(...ticks.map((tick) => title.right - tick.left)),
+  };
+})"""
+
+
+@pytest.mark.parametrize("printing", [False, True])
+def test_labels_of_axes_are_whole_and_clear_of_the_numbers(show, hexapod, printing):
+    page = show(hexapod)
+    page.evaluate("window.dispatchEvent(new Event('beforeprint'))")  # draws all charts
+    if not printing:
+        page.evaluate("window.dispatchEvent(new Event('afterprint'))")
+    page.wait_for_timeout(1000)
+    found = page.evaluate(LABELS)
+    assert len(found) > 25
+    assert any("<br>" in each["label"] for each in found)
+    assert [each for each in found if each["outside"] > 0.5 or each["over"] > 0.5] == []
+
+
+def test_no_axis_is_stretched_for_rounding(show, hexapod):
+    """Balls take no torque; what is computed is not exactly none."""
+    page = show(hexapod)
+    page.evaluate("window.dispatchEvent(new Event('beforeprint'))")
+    script = """node => [node.layout.yaxis.title.text, node.layout.yaxis.range,
+                         Math.max(...node.data.flatMap((curve) => [...curve.y].map(Math.abs)))]"""
+    labels = page.locator(".chart .plot:has(.main-svg)").evaluate_all(f"nodes => nodes.map({script})")
+    (torque,) = (each for each in labels if re.sub("<[^>]*>", "", each[0]).startswith("torque |T|, platform"))
+    (_, (low, high), largest) = torque
+    assert 0.0 < largest < 1e-3 * high
+    assert low == -high
+    assert high < 1e-3  # N m, where forces are kN
+
+
 # --- hostile names, long motions ----------------------------------------------------------------------------
 
 

@@ -80,7 +80,8 @@ def _of_motion(along: Along) -> list[tuple[str, str]]:
     found = [("motion", f"{facts['end'] - facts['start']:g} s, {facts['states']} states")]
     for name, rows, unit in (("peak force", peaks, "N"), ("peak power of an actuator", powers, "W")):
         if rows:
-            found.append((name, f"{max(abs(row['peak']) for row in rows):.0f} {unit}"))
+            peak = max(abs(row["peak"]) for row in rows)
+            found.append((name, f"{f'{peak:.0f}' if peak >= 100.0 else significant(peak)} {unit}"))
     if nearest := facts["nearest_to_singular"]:
         found.append(("smallest singular value", significant(nearest["sigma_min"])))
     if facts["without_answer"]:
