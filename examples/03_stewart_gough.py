@@ -38,8 +38,8 @@ kinematics = mech.kinematics(state.pose, state.twist, state.acceleration)
 print("leg rates:", kinematics.rates.round(4), "m/s")
 
 # 3. And back: leg rates and accelerations give the platform's twist and acceleration.
-twist, _ = mech.platform_twist(state.pose, kinematics.rates)
-acceleration, _ = mech.platform_acceleration(state.pose, twist, kinematics.accelerations)
+twist = mech.platform_twist(state.pose, kinematics.rates).twist
+acceleration = mech.platform_acceleration(state.pose, twist, kinematics.accelerations).acceleration
 assert np.allclose(twist, state.twist)
 assert np.allclose(acceleration, state.acceleration)
 

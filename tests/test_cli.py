@@ -309,9 +309,12 @@ def test_samples_go_between_the_rows_of_a_file(run, tmp_path):
 
 def test_info_draws_the_mechanism(run, tmp_path):
     figure = tmp_path / "machine.png"
-    run("info", str(DATA / "3-rps.toml"), "--draw", str(figure))
+    status, out, _ = run("info", str(DATA / "3-rps.toml"), "--draw", str(figure))
+    assert (status, out.splitlines()[-1]) == (0, f"Written: {figure}")
     assert figure.read_bytes().startswith(b"\x89PNG")
     assert figure.stat().st_size > 10_000
+    _, out, _ = run("info", str(DATA / "3-rps.toml"), "--draw", str(figure), "--json")
+    assert json.loads(out)["name"] == "3-rps"
 
 
 # --- workspace ----------------------------------------------------------------------------------------------
@@ -358,6 +361,20 @@ def test_workspace_by_a_lattice(run):
         (("--step", "0"), "step of x is 0.0"),
         (("--step", "2 parsecs"), "--step: 'parsecs' is no unit"),
         (("--step", "wide"), "--step is 'wide'"),
+        (("--step", "3deg"), "--step: 'deg' is no unit of length; valid: m, mm, cm, um, in"),
+        (("--vary", "x,alpha", "--step", "3deg"), "such as --step alpha=3deg"),
+        (("--vary", "x,alpha", "--step", "3"), "such as --step x=20mm --step alpha=10deg"),
+        (("--vary", "x,y", "--step", "alpha=3mm"), "--step alpha: 'mm' is no unit of angle; valid: rad, deg"),
+        (("--vary", "x,y,z", "--fix", "alpha=2mm"), "--fix alpha: 'mm' is no unit of angle"),
+        (
+            ("--vary", "x,y,z", "--fix", "axis_x=2mm"),
+            "--fix axis_x is '2mm'; must be a number without a unit",
+        ),
+        (("--bounds", "z=2deg:3deg"), "--bounds z: 'deg' is no unit of length"),
+        (
+            ("--vary", "x,y,z", "--fix", "alpah=2deg"),
+            "--fix: 'alpah' is no coordinate; did you mean \"alpha\"?",
+        ),
         (("--kind", "slice"), "needs --vary"),
         (("--kind", "lattice", "-o", "w.stl"), "--output is not for --kind lattice"),
         (("--fix", "x=0"), "--fix is for slices"),

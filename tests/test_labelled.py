@@ -31,6 +31,8 @@ def answers(mech, poses):
     found = [
         mech.inverse_kinematics(poses),
         mech.kinematics(*still),
+        mech.platform_twist(poses, np.zeros(mech.n_legs)),
+        mech.platform_acceleration(poses, REST, np.zeros(mech.n_legs)),
         mech.inverse_dynamics(*still),
         mech.forward_dynamics(poses, REST, np.zeros(mech.n_legs)),
         mech.equations_of_motion(poses, REST),

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from matplotlib import pyplot as plt
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 import polypod as pp
@@ -100,6 +101,15 @@ def test_fig4_of_a_mechanism_without_rod_shows_its_constraints():
     assert labels_of(axes[10]) == ["$f_{c,1}$", "$f_{c,2}$", "$f_{c,3}$"]
     assert axes[10].get_ylabel() == "constraint $f_c$ / N"
     assert labels_of(axes[11]) == [r"$\sigma_\mathrm{min}$"]
+
+
+@pytest.mark.parametrize(("kinds", "unit"), [("BBE", "N"), ("DDD", "N m"), ("ADE", "N or N m")])
+def test_multipliers_have_the_unit_of_their_kind(kinds, unit):
+    """All but those of kind D are those of a length: forces."""
+    mech = pp.load(FILES[1])
+    data = solve_some(mech, z=0.5, rx=0.0, ry=0.0).dataset
+    rows = [f"{kind} of leg {i + 1}" for i, kind in enumerate(kinds)]
+    assert plots.fig4_panels(data.assign_coords(constraint_row=rows))[10].unit == unit
 
 
 def test_fig4_of_a_mechanism_without_constraints_shows_power():
@@ -270,3 +280,67 @@ def test_four_views_of_a_workspace_and_an_outline(tmp_path):
     assert flat.axes[0].get_ylim()[1] == pytest.approx(55.7, abs=5.0)
     for i, figure in enumerate((solid, flat)):
         plots.save_figure(figure, tmp_path / f"{i}.svg")
+
+
+# --- parts of figures ---------------------------------------------------------------------------------------
+
+SIZE, DPI = (8, 6), 50
+
+
+def drawing(what, mech, solution):
+    """A function that draws on a figure or on a part of one."""
+    if what == "workspace":
+        found = mech.workspace(step=0.12)
+        return lambda canvas: plots.plot_workspace(found, canvas)
+    if what == "outline":
+        flat = mech.workspace(["azimuth", "tilt"], {"x": 0.0, "y": 0.1, "z": 0.7}, step=0.2)
+        return lambda canvas: plots.plot_workspace(flat, canvas)
+    if what == "mechanism":
+        return lambda canvas: plots.plot_mechanism(mech, ax=canvas.add_axes((0, 0, 1, 1), projection="3d"))
+    if what == "poses":
+        poses = {"centre": mech.home, "moved": solution.dataset["pose"].to_numpy()[50]}
+        return lambda canvas: plots.plot_poses(mech, poses, canvas)
+    return lambda canvas: plots.plot_fig4(solution, canvas)
+
+
+def pixels(figure):
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()
+    return np.asarray(canvas.buffer_rgba())
+
+
+@pytest.mark.parametrize("what", ["workspace", "outline", "mechanism", "poses", "fig4"])
+def test_a_part_of_a_figure_looks_like_a_figure(what, mech, solution):
+    draw = drawing(what, mech, solution)
+    alone, both = Figure(SIZE, dpi=DPI), Figure((2 * SIZE[0], SIZE[1]), dpi=DPI)
+    draw(alone)
+    part, beside = both.subfigures(1, 2)
+    draw(part)
+    beside.subplots().plot([0, 1])
+    assert np.array_equal(pixels(both)[:, : SIZE[0] * DPI], pixels(alone))
+
+
+@pytest.mark.parametrize("what", ["workspace", "outline", "poses", "fig4"])
+def test_layout_engines_leave_panels_where_they_are(what, mech, solution):
+    """Of the figure that is given none remains; of a part's the other parts keep it."""
+    draw = drawing(what, mech, solution)
+    plain, given, both = (Figure(SIZE, layout=layout) for layout in (None, "constrained", "constrained"))
+    part, beside = both.subfigures(2, 1)
+    beside.subplots().plot([0, 1])
+    places = []
+    for canvas, whole in ((plain, plain), (given, given), (part, both)):
+        draw(canvas)
+        before = [ax.get_position(original=True).bounds for ax in canvas.axes]
+        pixels(whole)
+        places.append([ax.get_position(original=True).bounds for ax in canvas.axes])
+        assert before == places[-1]
+    assert places[0] == places[1]
+    assert type(both.get_layout_engine()).__name__ == "ConstrainedLayoutEngine"
+
+
+def test_a_part_of_a_figure_is_saved_with_the_whole(tmp_path):
+    figure = Figure()
+    part, _ = figure.subfigures(1, 2)
+    plots.save_figure(figure, tmp_path / "whole.png")
+    plots.save_figure(part, tmp_path / "part.png")
+    assert (tmp_path / "whole.png").read_bytes() == (tmp_path / "part.png").read_bytes()

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import ast
+import dataclasses
 import importlib
 import inspect
 import re
 import sys
+import textwrap
 from collections.abc import Iterator
 from pathlib import Path
 from types import ModuleType
@@ -14,6 +17,9 @@ from typing import Any
 import pytest
 
 import polypod as pp
+from polypod.derivatives import InverseDynamicsDerivatives
+from polypod.labelled import Answer
+from polypod.variables import variable
 
 sys.path.insert(0, str(Path(__file__).parent))
 
@@ -90,3 +96,50 @@ def test_every_method_of_a_mechanism_is_in_the_reference() -> None:
 def test_it_has_a_docstring(name: str) -> None:
     """What has none is left out of the page."""
     assert inspect.getdoc(documented()[name]), name
+
+
+# --- fields -------------------------------------------------------------------------------------------------
+
+
+def fields_of(kind: type) -> dict[str, str]:
+    """What the source says below each field of a data class."""
+    body = ast.parse(textwrap.dedent(inspect.getsource(kind))).body[0].body  # type: ignore[attr-defined]
+    found = {}
+    for field, text in zip(body, [*body[1:], None], strict=True):
+        if isinstance(field, ast.AnnAssign) and "ClassVar" not in ast.unparse(field.annotation):
+            said = isinstance(text, ast.Expr) and isinstance(text.value, ast.Constant)
+            found[field.target.id] = inspect.cleandoc(text.value.value) if said else ""
+    return found
+
+
+RECORDS = {
+    name: thing
+    for name, thing in documented().items()
+    if dataclasses.is_dataclass(thing)
+    and (issubclass(thing, Answer) or thing.__module__ == "polypod.answers")
+}
+ANSWERS = {name: kind for name, kind in RECORDS.items() if issubclass(kind, Answer) and kind is not Answer}
+
+
+@pytest.mark.parametrize("name", sorted(RECORDS))
+def test_every_field_is_documented(name: str) -> None:
+    for field, said in fields_of(RECORDS[name]).items():
+        assert said, f"{name}.{field}"
+
+
+@pytest.mark.parametrize("name", sorted(ANSWERS))
+def test_arrays_of_answers_are_told_with_shape_and_unit(name: str) -> None:
+    """Those of the table of quantities, which datasets have."""
+    kind = ANSWERS[name]
+    fields = fields_of(kind)
+    for field, key in kind._variables.items():
+        about, said = variable(key), fields[field]
+        shape = re.match(r"\((.*?),?\)", said)
+        assert shape, f"{name}.{field} has no shape: {said}"
+        leading = 0 if field in kind._same_for_all or "status" not in fields else 1  # else no batch
+        assert len(shape[1].split(", ")) == leading + len(about.dims), f"{name}.{field}: {said}"
+        if kind is InverseDynamicsDerivatives:
+            continue  # its own text tells the rule
+        for unit in re.split(r" and | or |, ", about.unit.partition(";")[0]):
+            alone = rf"(?<![\w/^]){re.escape(unit)}(?![\w/^])"
+            assert unit in ("", "1") or re.search(alone, said), f"{name}.{field} is in {unit}: {said}"

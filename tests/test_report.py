@@ -14,11 +14,12 @@ import pytest
 
 import polypod as pp
 from polypod.actuators import leg_power, requirements, rms_over_time
-from polypod.report import reactions as reactions_module
 from polypod.report.decimate import POINTS, kept, spans
 from polypod.report.formulas import to_html
-from polypod.report.reactions import reactions_along
+from polypod.report.reactions import reactions_along, reactions_table
+from polypod.solution import CHUNK
 from polypod.summary import summarise
+from polypod.tables import fixed
 
 NAME = "lu-3spu-2rpu-r"
 ROOT = Path(__file__).parents[1]
@@ -106,6 +107,21 @@ def test_passive_legs_are_no_actuators():
     assert [row["leg"] for row in requirements(tripod, pp.solve(tripod, path))] == ["1", "2", "3"]
 
 
+def test_small_peaks_keep_their_figures_and_no_zero_is_negative():
+    """A planar mechanism, whose actuators carry no weight."""
+    planar = pp.load(ROOT / "docs" / "mechanisms" / "planar.toml")
+    path = pp.Motion.through([0.0, 4.0], {"x": [0, 0.01], "y": [0, 0.01], "rz": [0.52, 0.6]}, set="pose")
+    solution = pp.solve(planar, path.sample(np.linspace(0.0, 4.0, 21)))
+    html = pp.report_html(planar, solution, workspace=False)
+    glance = dict(re.findall(r"<dt>(.*?)</dt><dd>(.*?)</dd>", html))
+    peak, unit = glance["peak force"].split()
+    largest = float(np.max(np.abs(solution.dataset["force"].to_numpy())))
+    assert unit == "N"
+    assert float(peak) == pytest.approx(largest, rel=5e-3)
+    assert 0.0 < largest < 0.5
+    assert ">-0.0<" not in html
+
+
 # --- fewer points -------------------------------------------------------------------------------------------
 
 
@@ -186,15 +202,19 @@ def test_reactions_are_those_of_solve(mech, motion):
     assert found.undetermined.any()
 
 
-def test_of_a_long_motion_some_reactions_are_looked_at(mech, solution, monkeypatch):
-    monkeypatch.setattr(reactions_module, "STATES", 100)
+def test_a_state_of_a_long_motion_has_the_reactions_that_it_has_alone(mech):
+    """Beyond one chunk, too: the table's peaks are those of all states."""
+    motion = pp.load_motion(NAME, mech).sample(np.linspace(0.0, 8.0, CHUNK + 1003))
+    solution = pp.solve(mech, motion)
     found = reactions_along(mech, solution)
-    assert 50 <= len(found.time) < 200
-    force = solution.dataset["force"].to_numpy()
-    peak = solution.dataset["time"].to_numpy()[np.argmax(np.abs(force).max(axis=1))]
-    assert peak in found.time
-    table = reactions_module.reactions_table(found)
-    assert len(table.rows) == len(mech.joint_list)
+    data = solution.dataset
+    motions = (data[name].to_numpy() for name in ("pose", "twist", "acceleration", "wrench"))
+    whole = mech.joint_reactions(*motions, data.attrs["wrench_axes"]).reactions
+    assert np.array_equal(found.time, data["time"].to_numpy())
+    assert np.array_equal(found.force, np.linalg.norm(whole[..., :3], axis=-1))
+    assert np.array_equal(found.torque, np.linalg.norm(whole[..., 3:], axis=-1))
+    table = reactions_table(found)
+    assert [row[3] for row in table.rows] == [fixed(peak) for peak in found.force.max(axis=0)]
 
 
 # --- the page -----------------------------------------------------------------------------------------------
@@ -219,8 +239,27 @@ def test_a_report_without_motion(name):
     assert 'id="actuators"' not in html
     assert "Table I" not in html
     assert not outside(html)
-    # This one's start is no node of the default grid: the page says so, instead of an error.
-    assert ("None was found" in html) == (name == "3-rps")
+    # The o of this one does not move freely in space: its workspace is one of its own coordinates.
+    assert ("All values that z, rx and ry can take together" in html) == (name == "3-rps")
+    assert ('id="space"' in html) == (name != "3-rps")
+
+
+def test_a_slice_in_a_report_is_told_as_one(mech):
+    """Angles are not drawn in space, as if they were lengths."""
+    tilts = mech.workspace(["azimuth", "tilt"], {"x": 0.0, "y": 0.1, "z": 0.7}, step=0.2)
+    html = pp.report_html(mech, workspace=tilts)
+    assert "All values that azimuth and tilt can take together inside all limits at x = 0.0 mm" in html
+    assert 'id="space"' not in html
+    reach = mech.workspace(["x", "y", "z"], {"alpha": 0.1, "beta": 0.6}, step=0.1)
+    assert 'id="space"' in pp.report_html(mech, workspace=reach)
+
+
+def test_a_report_says_why_it_has_no_workspace():
+    data = pp.load(DATA / "3-rps.toml").to_dict()
+    for leg in data["legs"]:
+        del leg["stroke"]
+    html = pp.report_html(pp.Mechanism.from_dict(data))
+    assert "None was found: bounds.x: 3-rps has no strokes that bound it" in html
 
 
 @pytest.mark.parametrize("rows", [1, 2, 3])

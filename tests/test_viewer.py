@@ -258,6 +258,7 @@ def test_huge_motions_are_thinned_and_say_so(mech, motion):
     rows = np.searchsorted(dense.time, track.time)
     np.testing.assert_allclose(track.pose, whole.pose[rows], atol=1e-12)
     np.testing.assert_allclose(track.twist, whole.twist[rows], atol=1e-9)
+    assert len(track_of(mech, dense).time) == 30_000
     few = track_of(mech, motion)
     assert few.words == f"{NAME}: 0 s to 8 s, 801 rows."
     assert few.total == len(few.time) == 801

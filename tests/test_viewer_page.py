@@ -162,6 +162,17 @@ def test_a_change_is_answered_within_one_frame(viewer):
     assert np.median(times) < 1.0 / 30.0
 
 
+@pytest.mark.parametrize(("path", "degrees"), [("planar", 50.0), ("hexapod", 19.0)])
+def test_a_flat_machine_is_seen_from_above(path, degrees):
+    viewer = Viewer(pp.load(DATA.parents[1] / "docs" / "mechanisms" / f"{path}.toml"), port=0)
+    try:
+        camera = viewer._server.initial_camera
+        way = np.array(camera.position) - np.array(camera.look_at)
+        assert np.degrees(np.arcsin(way[2] / np.linalg.norm(way))) == pytest.approx(degrees)
+    finally:
+        viewer.stop()
+
+
 def test_names_from_a_file_are_texts(mech):
     """Names of legs are not part of the scene's names, nor HTML."""
     data = mech.to_dict()

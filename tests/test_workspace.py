@@ -614,3 +614,9 @@ def test_a_mechanism_without_strokes_needs_bounds(hexapod):
     assert found.mask.all()
     assert found.shares == {EDGE_OF_GRID: 1.0}
     assert found.volume < 0.4 * 0.4 * 0.2  # corners are cut
+
+
+def test_where_o_does_not_move_freely_a_slice_is_named():
+    with pytest.raises(pp.WorkspaceError, match="or a slice over z, rx, ry"):
+        pp.load(DATA / "3-rps.toml").workspace()
+    assert pp.load(DATA / "3-rps.toml").workspace(["z", "rx", "ry"], step={"rx": 0.1, "ry": 0.1}).volume > 0.1

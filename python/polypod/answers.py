@@ -1,7 +1,8 @@
 """What a mechanism answers: named arrays over a batch of states, SI, base axes; and its mobility.
 
-The shapes are written with n legs, k rods or constraints, and `...` for the batch. Every answer has a
-`Status` per state, knows the mechanism that was asked, and goes to xarray by `to_xarray`.
+The shapes are written with n legs, k rods or constraints, and `...` for the batch. Vectors are in base axes
+unless another frame is named. Every answer has a `Status` per state, knows the mechanism that was asked, and
+goes to xarray by `to_xarray`.
 """
 
 from __future__ import annotations
@@ -26,16 +27,19 @@ class State(Answer):
     """A platform's motion, and all numbers of its coordinate set."""
 
     pose: Array
-    """(..., 4, 4)."""
+    """(..., 4, 4): platform axes to base axes, o in m."""
     twist: Array
     """(..., 6): v of o in m/s, ω in rad/s."""
     acceleration: Array
     """(..., 6): a of o in m/s^2, ε in rad/s^2."""
     coordinates: dict[str, Array]
-    """Given and dependent ones, m and rad."""
+    """By name, (...) each: given and dependent ones, m and rad."""
     coordinate_rates: dict[str, Array]
+    """By name, (...) each: m/s and rad/s."""
     coordinate_second_rates: dict[str, Array]
+    """By name, (...) each: m/s^2 and rad/s^2."""
     status: Codes
+    """(...): `Status` of each state."""
 
     _variables: ClassVar = {
         "pose": "pose",
@@ -76,8 +80,9 @@ class InverseKinematics(Answer):
     vectors: Array
     """(..., n, 3): r from B to b, m."""
     directions: Array
-    """(..., n, 3): δ."""
+    """(..., n, 3): δ, unit vectors along r."""
     status: Codes
+    """(...): `Status` of each state."""
 
     _variables: ClassVar = {
         "lengths": "length",
@@ -92,12 +97,13 @@ class ForwardKinematics(Answer):
     """The platform for given leg lengths [T25-T27]."""
 
     pose: Array
-    """(..., 4, 4): NaN where none was found."""
+    """(..., 4, 4): platform axes to base axes, o in m; NaN where none was found."""
     residual: Array
     """(...): the largest error of a length or of a constraint, m."""
     iterations: Array
     """(...): Newton steps."""
     status: Codes
+    """(...): `Status` of each state."""
 
     _variables: ClassVar = {
         "pose": "pose",
@@ -112,7 +118,7 @@ class AssemblyModes(Answer):
     """All real poses for given leg lengths, highest first [T28]; NaN beyond `number`."""
 
     pose: Array
-    """(..., m, 4, 4), m the largest number in the batch."""
+    """(..., m, 4, 4): o in m; m is the largest number in the batch."""
     number: NDArray[np.int64]
     """(...): number of modes."""
     determinant_sign: Array
@@ -155,11 +161,11 @@ class Kinematics(Answer):
     accelerations: Array
     """(..., n): ℓ'', m/s^2 [Eq. 15]."""
     directions: Array
-    """(..., n, 3): δ."""
+    """(..., n, 3): δ, unit vectors along the legs."""
     leg_omega: Array
-    """(..., n, 3): rad/s [Eq. 26, 33]."""
+    """(..., n, 3): angular velocity of the legs, rad/s [Eq. 26, 33]."""
     leg_eps: Array
-    """(..., n, 3): rad/s^2 [Eq. 28, 35]."""
+    """(..., n, 3): angular acceleration of the legs, rad/s^2 [Eq. 28, 35]."""
     leg_spin: Array
     """(..., n): share of the leg's angular velocity along δ, rad/s [T6]."""
     leg_spin_rate: Array
@@ -167,11 +173,11 @@ class Kinematics(Answer):
     piston_velocity: Array
     """(..., n, 3): of the piston's mass centre, m/s [Eq. 38]."""
     piston_acceleration: Array
-    """(..., n, 3): m/s^2 [Eq. 39]."""
+    """(..., n, 3): of the piston's mass centre, m/s^2 [Eq. 39]."""
     cylinder_velocity: Array
     """(..., n, 3): of the cylinder's mass centre, m/s [Eq. 38]."""
     cylinder_acceleration: Array
-    """(..., n, 3): m/s^2 [Eq. 39]."""
+    """(..., n, 3): of the cylinder's mass centre, m/s^2 [Eq. 39]."""
     base_joint_angles: Array
     """(..., n, 2): leg against base, zero at home, rad: about the axis in the base, then n; or NaN."""
     base_joint_rates: Array
@@ -187,11 +193,11 @@ class Kinematics(Answer):
     rod_angle: Array
     """(..., k): turn of each rod about its line, zero at home, rad."""
     rod_omega: Array
-    """(..., k, 3): rad/s [Eq. 36]."""
+    """(..., k, 3): angular velocity of the rods, rad/s [Eq. 36]."""
     rod_eps: Array
-    """(..., k, 3): rad/s^2 [Eq. 37]."""
+    """(..., k, 3): angular acceleration of the rods, rad/s^2 [Eq. 37]."""
     status: Codes
-    """(...): `Status`."""
+    """(...): `Status` of each state."""
 
     _variables: ClassVar = {
         "lengths": "length",
@@ -220,14 +226,39 @@ class Kinematics(Answer):
 
 
 @dataclass(eq=False, repr=False)
+class PlatformTwist(Answer):
+    """The platform's motion for given leg rates [Eq. 13]."""
+
+    twist: Array
+    """(..., 6): v of o in m/s, ω in rad/s."""
+    status: Codes
+    """(...): `Status` of each state; SINGULAR where the rates do not determine it."""
+
+    _variables: ClassVar = {"twist": "twist", "status": "status"}
+
+
+@dataclass(eq=False, repr=False)
+class PlatformAcceleration(Answer):
+    """The platform's acceleration for given second rates of the legs [Eq. 19]."""
+
+    acceleration: Array
+    """(..., 6): a of o in m/s^2, ε in rad/s^2."""
+    status: Codes
+    """(...): `Status` of each state; SINGULAR where the legs do not determine it."""
+
+    _variables: ClassVar = {"acceleration": "acceleration", "status": "status"}
+
+
+@dataclass(eq=False, repr=False)
 class InverseDynamics(Answer):
     """What balances a motion [Eq. 43]."""
 
     forces: Array
     """(..., n): active forces, N, positive when they push the platform away; zero for passive legs."""
     constraint: Array
-    """(..., k): multipliers of the independent constraints; f_c in N for the paper's mechanism."""
+    """(..., k): multipliers of the independent constraints, N, of kind D N m; for the paper's machine f_c."""
     status: Codes
+    """(...): `Status` of each state."""
 
     _variables: ClassVar = {
         "forces": "force",
@@ -243,9 +274,10 @@ class ForwardDynamics(Answer):
     acceleration: Array
     """(..., 6): a of o in m/s^2, ε in rad/s^2."""
     constraint: Array
-    """(..., k): multipliers of the independent constraints, as in `InverseDynamics`."""
+    """(..., k): multipliers of the independent constraints, N, of kind D N m."""
     status: Codes
-    """SINGULAR where the constraints depend on one another; actuators need not control the platform."""
+    """(...): `Status` of each state; SINGULAR where the constraints depend on one another: actuators need not
+    control the platform."""
 
     _variables: ClassVar = {
         "acceleration": "acceleration",
@@ -260,26 +292,30 @@ class EquationsOfMotion(Answer):
 
     In platform space q' is the twist V, and the multipliers of the constraints push, too:
     M A + C V + D V + g = (rows of `mech.jacobian`)ᵀ (f, f_c) + W/η. The efficiency η divides the
-    platform's own mass, weight and damping in M, C, D and g, as it does in `inverse_dynamics`.
+    platform's own mass, weight and damping in M, C, D and g, as it does in `inverse_dynamics`. Units are
+    those of a twist, v in m/s before ω in rad/s, or of the coordinates' rates, m/s and rad/s.
     """
 
     coordinates: tuple[str, ...]
     """Names of the d independent coordinates; empty in platform space."""
     mass: Array
-    """(..., d, d): M, symmetric, positive definite on the motions that the constraints allow."""
+    """(..., d, d): M, kg, kg m and kg m^2; symmetric, positive definite on the motions that the constraints
+    allow."""
     coriolis: Array
-    """(..., d, d): C, with M' - 2C skew-symmetric on the motions that the constraints allow."""
+    """(..., d, d): C, kg/s, kg m/s and kg m^2/s; M' - 2C is skew-symmetric on the motions that the
+    constraints allow."""
     damping: Array
-    """(..., d, d): D, of the platform."""
+    """(..., d, d): D, of the platform, N s/m, N s and N m s."""
     gravity: Array
-    """(..., d): g, the gradient of the potential energy where η is 1."""
+    """(..., d): g, N and N m; the gradient of the potential energy where η is 1."""
     twist_jacobian: Array
-    """(..., 6, d): S of V = S q'; of a load W on the platform it takes Sᵀ W/η."""
+    """(..., 6, d): S of V = S q', 1, m and 1/m; of a load W on the platform it takes Sᵀ W/η."""
     leg_jacobian: Array
-    """(..., n, d): J of ℓ' = J q', all legs; of their forces it takes Jᵀ f."""
+    """(..., n, d): J of ℓ' = J q', all legs, 1 and m; of their forces it takes Jᵀ f."""
     rates: Array
-    """(..., d): q' of the twist."""
+    """(..., d): q' of the twist, m/s and rad/s."""
     status: Codes
+    """(...): `Status` of each state."""
 
     _variables: ClassVar = {
         "mass": "mass_matrix",
@@ -303,6 +339,7 @@ class CoupledForces(Answer):
     """Forces of two legs on one rod, and the torque on the rod [T16]."""
 
     legs: tuple[str, str]
+    """Their names."""
     forces: Array
     """(..., 2): f_c1 and f_c3 on the platform at b_1 and b_3 along c_1 = r_1×L/|r_1×L|, N.
 
@@ -311,6 +348,7 @@ class CoupledForces(Answer):
     torque: Array
     """(...): T_c about the rod's line, N m."""
     status: Codes
+    """(...): `Status` of each state."""
 
     _variables: ClassVar = {
         "forces": "coupled_force",
@@ -350,28 +388,31 @@ class JointReactions(Answer):
     """
 
     joints: tuple[Joint, ...]
+    """The j joints, as in `Mechanism.joint_list`."""
     points: Array
     """(..., j, 3): the joints' points in base axes, m: B, and b for prismatic and platform joints."""
     axes: Array
     """(..., j, 3, 3): joint axes to base axes, the axes as columns."""
     reactions: Array
-    """(..., j, 6): without couples in U joints [T47], in base axes."""
+    """(..., j, 6): without couples in U joints [T47], in base axes, N and N m."""
     reactions_in_joint: Array
-    """(..., j, 6): the same in joint axes."""
+    """(..., j, 6): the same in joint axes, N and N m."""
     least: Array
-    """(..., j, 6): least sum of |F|^2 + |T/length|^2 over all joints [T47], in base axes."""
+    """(..., j, 6): least sum of |F|^2 + |T/length|^2 over all joints [T47], in base axes, N and N m."""
     least_in_joint: Array
-    """(..., j, 6): the same in joint axes."""
+    """(..., j, 6): the same in joint axes, N and N m."""
     determinate: NDArray[np.bool_]
     """(..., j, 6): which components in base axes balance alone determines [T46]; False without answer."""
     determinate_in_joint: NDArray[np.bool_]
     """(..., j, 6): the same in joint axes."""
     constraint_wrench: Array
-    """(..., 6): on the platform, at o in base axes, of all legs that constrain it, less their active forces.
+    """(..., 6): on the platform, at o in base axes, of all legs that constrain it, less their active forces;
+    N and N m.
 
     Determinate, and no matter of convention; of legs and rods without mass it is the sum of f_c (c, τ) [T48].
     """
     status: Codes
+    """(...): `Status` of each state."""
 
     _variables: ClassVar = {
         "points": "joint_point",
@@ -398,18 +439,19 @@ class Power(Answer):
     kinetic_rate: Array
     """(...): exact rate along the motion, W."""
     potential_rate: Array
-    """(...): W."""
+    """(...): exact rate along the motion, W."""
     actuators: Array
     """(...): active forces times leg rates, W, positive where they drive; NaN where SINGULAR."""
     load: Array
-    """(...): W, positive where the load drives."""
+    """(...): power of the load, W, positive where it drives."""
     damping: Array
-    """(...): W, never positive."""
+    """(...): power of the damping, W, never positive."""
     friction: Array
-    """Power that the efficiency η stands for, negative where it takes."""
+    """(...): power that the efficiency η stands for, W, negative where it takes."""
     residual: Array
-    """actuators + load + damping + friction - kinetic_rate - potential_rate: zero up to rounding."""
+    """(...): actuators + load + damping + friction - kinetic_rate - potential_rate, W; 0 up to rounding."""
     status: Codes
+    """(...): `Status` of each state."""
 
     _variables: ClassVar = {
         "kinetic": "kinetic_energy",
@@ -436,6 +478,7 @@ class Conditioning(Answer):
     condition: Array
     """(...): their quotient, sigma_max / sigma_min."""
     status: Codes
+    """(...): `Status` of each state."""
 
     _variables: ClassVar = {
         "sigma_min": "sigma_min",
@@ -452,7 +495,8 @@ class Limits(Answer):
     names: tuple[str, ...]
     """Such as "stroke max of leg 3"."""
     margins: Array
-    """(..., m): signed slack of each in its own unit, positive inside; NaN where it is not determined."""
+    """(..., m): signed slack of each in its own unit (m, rad, 1 or N), positive inside; NaN where it is not
+    determined."""
     relative: Array
     """(..., m): the same as a part of the limit's scale, a pure number."""
     binding: NDArray[np.int64]
@@ -460,6 +504,7 @@ class Limits(Answer):
     within: NDArray[np.bool_]
     """(...): whether no limit is passed; False where a margin is NaN or the state has no answer."""
     status: Codes
+    """(...): `Status` of each state."""
 
     _variables: ClassVar = {
         "margins": "limit_margin",
@@ -475,6 +520,7 @@ class Limit:
     """One limit of a mechanism."""
 
     name: str
+    """Such as "stroke max of leg 3"."""
     kind: str
     """stroke min, stroke max, base cone, platform cone, base angle, platform angle, rod angle, leg clearance,
     platform clearance, conditioning, force min or force max."""
@@ -492,10 +538,12 @@ class Limit:
 
 @dataclass(frozen=True)
 class GraphLink:
-    """A link of the topology graph; `joints` are indices."""
+    """A link of the topology graph."""
 
     name: str
+    """Such as "cylinder 1", "rod L" or "platform"."""
     joints: tuple[int, ...]
+    """Indices of its joints in `Mobility.graph_joints`."""
 
 
 @dataclass(frozen=True)
@@ -503,17 +551,23 @@ class GraphJoint:
     """A joint of the topology graph between two links."""
 
     kind: str
+    """R, S, U, P or F."""
     name: str
+    """Such as "platform joint 3"."""
     links: tuple[int, int]
+    """Indices of both links in `Mobility.graph_links`."""
 
 
 @dataclass(frozen=True)
 class Published:
-    """The accounting that the mechanism's publication gives."""
+    """The accounting that the mechanism's publication gives, in the terms of Eq. 1."""
 
     dof: int
+    """Freedoms M."""
     redundant: int
+    """Redundant constraints ς."""
     passive: int
+    """Passive freedoms M_0."""
 
 
 @dataclass(frozen=True)
@@ -521,11 +575,17 @@ class Mobility:
     """Freedoms of the mechanism from ranks at generic poses, in the terms of Eq. 1 [T18]."""
 
     dof: int
+    """Freedoms of the platform: M of Eq. 1."""
     links: int
+    """Number of links, base and platform among them: n_0 of Eq. 1."""
     joints: int
+    """Number of joints: n_k of Eq. 1."""
     joint_freedoms: int
+    """Freedoms of all joints together: ΣM_i of Eq. 1."""
     loops: int
+    """Independent loops, n_k - n_0 + 1: each has six closure equations."""
     closure_rank: int
+    """Number of closure equations that are independent."""
     redundant: int
     """Loop-closure equations that say nothing new: ς of Eq. 1."""
     redundant_legs: tuple[str, ...]
@@ -533,6 +593,7 @@ class Mobility:
     passive: int
     """Freedoms that leave the platform where it is: M_0 of Eq. 1."""
     passive_legs: tuple[str, ...]
+    """The legs that spin freely about their own line."""
     uncontrolled: int
     """Freedoms that remain at generic poses with all actuators locked: zero unless the design is singular."""
     constraint_rows: tuple[tuple[str, str], ...]
@@ -540,8 +601,11 @@ class Mobility:
     independent_rows: tuple[int, ...]
     """Indices of those that are independent."""
     graph_links: tuple[GraphLink, ...]
+    """The links of the topology graph, base and platform first."""
     graph_joints: tuple[GraphJoint, ...]
+    """Its joints."""
     published: Published | None
+    """The accounting of the file's `[published]`, if there is one."""
 
     def _repr_html_(self) -> str:
         from polypod.cards import of_mobility

@@ -64,15 +64,16 @@ def check_wrench_axes(name: str) -> None:
         raise UnknownNameError("wrench_axes", name, ("base", "platform"))
 
 
-def doubles(name: str, value: ArrayLike, last: Axes = ()) -> Array:
-    """`value` as doubles whose last axes are `last`."""
+def doubles(name: str, value: ArrayLike, last: Axes = (), *, batch: bool = True) -> Array:
+    """`value` as contiguous doubles whose last axes are `last`; its only ones unless it may be a batch."""
     try:
-        array = np.asarray(value, np.float64)
+        array = np.asarray(value, np.float64, order="C")
     except (TypeError, ValueError) as error:
         raise ShapeError(f"{name} is not an array of numbers: {error}") from None
-    if array.shape[array.ndim - len(last) :] != last:
-        expected = ", ".join(["...", *map(str, last)])
-        raise ShapeError(f"{name} has the shape {array.shape}; needs ({expected})")
+    own = array.shape[array.ndim - len(last) :] if batch else array.shape
+    if own != last:
+        expected = f"({', '.join(['...', *map(str, last)])})" if batch else last
+        raise ShapeError(f"{name} has the shape {array.shape}; needs {expected}")
     return array
 
 

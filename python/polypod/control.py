@@ -85,6 +85,6 @@ class ComputedTorque:
             + 2.0 * self.damping * self.frequency * (wanted.rates - rates)
             + self.frequency**2 * (wanted.lengths - lengths)
         )
-        acceleration, _ = mech.platform_acceleration(pose, twist, accelerations)
+        acceleration = mech.platform_acceleration(pose, twist, accelerations).acceleration
         wrench = None if sample.wrench is None else sample.wrench[0]
         return mech.inverse_dynamics(pose, twist, acceleration, wrench, sample.wrench_axes).forces

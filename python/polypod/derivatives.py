@@ -79,7 +79,7 @@ class InverseDynamicsDerivatives(Answer):
     lengths_by_geometry: Array
     """(..., n, g), of all legs, m/m and m; with six freedoms the pose is kept."""
     status: Codes
-    """FOLD where the coordinates do not determine the motion: all other derivatives stand."""
+    """(...): FOLD where the coordinates do not determine the motion: all other derivatives stand."""
 
     _variables: ClassVar = {
         "forces_by_pose": "forces_by_pose",
@@ -127,12 +127,13 @@ class Regressor(Answer):
     forces: Array
     """(..., n, p): Y, zero for passive legs; N/kg, N/(kg m), N/(kg m^2)."""
     constraint: Array
-    """(..., k, p): the same for the multipliers."""
+    """(..., k, p): the same for the multipliers; N/kg, N/(kg m), N/(kg m^2), of kind D with N m for N."""
     forces_offset: Array
     """(..., n): forces of load and damping alone, N."""
     constraint_offset: Array
-    """(..., k)."""
+    """(..., k): multipliers of load and damping alone, N, of kind D N m."""
     status: Codes
+    """(...): `Status` of each state."""
 
     _variables: ClassVar = {
         "values": "parameter_value",
@@ -162,9 +163,10 @@ class BaseParameters(Answer):
     columns: NDArray[np.int64]
     """(b,): their places in the regressor."""
     combination: Array
-    """(b, p): `combination @ regressor.values` are the base parameters; the identity on `columns`."""
+    """(b, p): `combination @ regressor.values` are the base parameters; 1, m and m^2; the identity on
+    `columns`."""
     values: Array
-    """(b,): the base parameters of the mechanism file; units as of their names."""
+    """(b,): the base parameters of the mechanism file; kg, kg m and kg m^2, as their names tell."""
     parameters: tuple[str, ...]
     """Names of all p parameters."""
     remainders: Array

@@ -19,7 +19,6 @@ from numpy.typing import ArrayLike, NDArray
 from polypod import _core
 from polypod.answers import (
     AssemblyModes,
-    Codes,
     Conditioning,
     CoupledForces,
     EquationsOfMotion,
@@ -35,6 +34,8 @@ from polypod.answers import (
     Limit,
     Limits,
     Mobility,
+    PlatformAcceleration,
+    PlatformTwist,
     Power,
     Published,
     State,
@@ -103,6 +104,8 @@ class Mechanism:
         self._limit_names = tuple(limit.name for limit in self.limit_list)
         self._lengths = Arguments(lengths=(len(legs),))
         self._guessed_lengths = Arguments(lengths=(len(legs),), guess=(4, 4))
+        self._rates = Arguments(pose=(4, 4), rates=(len(legs),))
+        self._second_rates = Arguments(pose=(4, 4), twist=(6,), accelerations=(len(legs),))
         self._driven = Arguments(pose=(4, 4), twist=(6,), forces=(len(legs),))
         sets = self._core.coordinate_sets()
         self._sets = {set: tuple(names) for set, names, _ in sets}
@@ -435,26 +438,28 @@ class Mechanism:
         states = MOTION(pose, twist, acceleration)
         return Kinematics(self, **self._core.kinematics(*states))
 
-    def platform_twist(self, pose: ArrayLike, rates: ArrayLike) -> tuple[Array, Codes]:
-        """The twist (..., 6) that gives the legs these rates (..., n), m/s, and the status [Eq. 13].
+    def platform_twist(self, pose: ArrayLike, rates: ArrayLike) -> PlatformTwist:
+        """The twist that gives the legs these rates [Eq. 13].
 
-        At a pose (..., 4, 4); the twist is at o in base axes, m/s and rad/s.
+        Args:
+            pose: (..., 4, 4).
+            rates: of the legs, (..., n), m/s; those of passive legs are not read.
         """
-        arrays = Arguments(pose=(4, 4), rates=(self.n_legs,))(pose, rates)
-        out = self._core.platform_twist(*arrays)
-        return out["twist"], out["status"]
+        arrays = self._rates(pose, rates)
+        return PlatformTwist(self, **self._core.platform_twist(*arrays))
 
     def platform_acceleration(
         self, pose: ArrayLike, twist: ArrayLike, accelerations: ArrayLike
-    ) -> tuple[Array, Codes]:
-        """The acceleration (..., 6) that gives the legs theirs (..., n), m/s², and the status [Eq. 19].
+    ) -> PlatformAcceleration:
+        """The platform's acceleration that gives the legs theirs [Eq. 19].
 
-        For a pose (..., 4, 4) and twist (..., 6); at o in base axes, m/s² and rad/s².
+        Args:
+            pose: (..., 4, 4).
+            twist: (..., 6).
+            accelerations: second rates of the legs, (..., n), m/s²; those of passive legs are not read.
         """
-        wanted = Arguments(pose=(4, 4), twist=(6,), accelerations=(self.n_legs,))
-        arrays = wanted(pose, twist, accelerations)
-        out = self._core.platform_acceleration(*arrays)
-        return out["acceleration"], out["status"]
+        arrays = self._second_rates(pose, twist, accelerations)
+        return PlatformAcceleration(self, **self._core.platform_acceleration(*arrays))
 
     # --- singularities -----------------------------------------------------------------------------------
 

@@ -5,6 +5,7 @@ Each function draws on the axes or figure that it is given, or makes them with p
 
 from __future__ import annotations
 
+import itertools
 from collections import defaultdict
 from collections.abc import Iterable, Mapping
 from os import PathLike
@@ -13,17 +14,17 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from matplotlib.patches import FancyBboxPatch
 from mpl_toolkits.mplot3d import Axes3D  # type: ignore[import-untyped]
 from numpy.typing import ArrayLike, NDArray
 
 from polypod.answers import Mobility
+from polypod.canvas import Canvas, cells, pyplot_figure, size_of
 from polypod.errors import PolypodError, ShapeError
 from polypod.mechanism import Mechanism
 from polypod.results import Solution
 from polypod.scene import Scene, draw, frame, joint_handles, math_name
-from polypod.series import Panel, draw_panel, in_kilo, pyplot_figure, stroke_of
+from polypod.series import Panel, draw_panel, in_kilo, stroke_of
 from polypod.series import plot_series as plot_series
 from polypod.status import Status, count
 from polypod.style import BLUE, GREY, INK, house_style
@@ -34,8 +35,10 @@ from polypod.workspace_plot import plot_workspace_view as plot_workspace_view
 Array = NDArray[np.float64]
 
 
-def save_figure(figure: Figure, path: str | PathLike[str]) -> None:
+def save_figure(figure: Canvas, path: str | PathLike[str]) -> None:
     """Saves a figure as `.svg` or as `.png` with 200 dots per inch; the same figure gives the same bytes.
+
+    Of a subfigure it saves the whole figure.
 
     Raises PolypodError for another suffix.
     """
@@ -46,7 +49,7 @@ def save_figure(figure: Figure, path: str | PathLike[str]) -> None:
     if metadata is None:
         raise PolypodError(f"{path} ends in {path.suffix!r}; a figure's file ends in .svg or .png")
     with house_style():
-        figure.savefig(path, metadata=metadata, dpi=200)
+        figure.get_figure(root=True).savefig(path, metadata=metadata, dpi=200)
 
 
 # --- the mechanism in space ---------------------------------------------------------------------------------
@@ -84,16 +87,16 @@ def plot_mechanism(
 def plot_poses(
     mech: Mechanism,
     poses: Mapping[str, ArrayLike] | Iterable[ArrayLike],
-    figure: Figure | None = None,
+    figure: Canvas | None = None,
     *,
     columns: int = 4,
-) -> Figure:
+) -> Canvas:
     """The mechanism at several poses, side by side at one scale, as in Fig. 1 of the paper.
 
     Args:
         mech: the mechanism.
         poses: (4, 4) each, with their captions as keys, or without captions.
-        figure: to draw on.
+        figure: a figure or a subfigure to draw on.
         columns: in a row.
     """
     if isinstance(poses, Mapping):
@@ -109,10 +112,11 @@ def plot_poses(
         figure = figure or pyplot_figure((3.2 * columns, 3.5 * rows))
         scenes = [Scene(mech, _checked_pose(pose)) for pose in places]
         half = np.max([np.ptp(scene.corners(), axis=0) / 2 for scene in scenes], axis=0)
-        cells = figure.add_gridspec(
-            rows, columns, left=0.0, right=1.0, bottom=0.11, top=1.0, wspace=0.0, hspace=0.12
+        grid = cells(
+            figure, rows, columns, left=0.0, right=1.0, bottom=0.11, top=1.0, wspace=0.0, hspace=0.12
         )
-        spaces = [figure.add_subplot(cells[i], projection="3d") for i in range(len(scenes))]
+        rects = [*itertools.chain(*grid)][: len(scenes)]
+        spaces = [figure.add_axes(rect, projection="3d") for rect in rects]
         views = list(zip(spaces, scenes, captions, strict=True))
         zoom = min(frame(ax, scene.corners(), half) for ax, scene, _ in views)
         for i, (ax, scene, caption) in enumerate(views):
@@ -136,11 +140,12 @@ def _checked_pose(pose: ArrayLike) -> Array:
 # --- the curves of Fig. 4 -----------------------------------------------------------------------------------
 
 
+_COLUMNS = 3
 _COMPONENTS = "xyz"
 _GREEK = {"alpha": r"$\alpha$", "beta": r"$\beta$", "gamma": r"$\gamma$"}
 
 
-def plot_fig4(solution: Solution, figure: Figure | None = None) -> Figure:
+def plot_fig4(solution: Solution, figure: Canvas | None = None) -> Canvas:
     """The twelve panels of the paper's Fig. 4: motion of the platform (a-f), legs (g-i), forces (j-l).
 
     Lengths are in mm and angles in degrees, everything else is SI. Spans of time with a status other than OK
@@ -149,24 +154,19 @@ def plot_fig4(solution: Solution, figure: Figure | None = None) -> Figure:
 
     The couples in the platform joints of legs on one rod are statically indeterminate; (k) and (l) take them
     as zero.
+
+    Args:
+        solution: of `solve`, of a simulation, or from a file.
+        figure: a figure or a subfigure to draw on.
     """
     data = solution.dataset
     panels = fig4_panels(data)
-    columns = 3
-    rows = -(-len(panels) // columns)
     with house_style():
-        figure = figure or pyplot_figure((10.0, 2.55 * rows + 0.3))
-        figure.set_layout_engine("none")
-        width, height = figure.get_size_inches()
-        grid = figure.subplots(rows, columns, sharex=True, squeeze=False)
-        # Margins in inches: the same at any size, and much faster than a layout engine.
-        figure.subplots_adjust(
-            left=0.68 / width, right=1 - 0.12 / width, bottom=0.55 / height, top=1 - 0.3 / height
-        )
-        figure.subplots_adjust(wspace=0.3, hspace=0.2)
+        figure = figure or pyplot_figure((10.0, 2.55 * -(-len(panels) // _COLUMNS) + 0.3))
         time = data["time"].to_numpy()
         lost = (data["status"] != Status.OK).to_numpy()
-        for i, (ax, panel) in enumerate(zip(grid.flat, panels, strict=False)):
+        axes = _fig4_axes(figure, len(panels))
+        for i, (ax, panel) in enumerate(zip(axes, panels, strict=True)):
             draw_panel(ax, panel, time, lost)
             ax.text(-0.02, 1.04, f"({chr(97 + i)})", transform=ax.transAxes, ha="right", va="bottom")
         if lost.any():
@@ -174,13 +174,28 @@ def plot_fig4(solution: Solution, figure: Figure | None = None) -> Figure:
                 f"{Status(code).name.lower().replace('_', ' ')}" for code, _, _ in count(data["status"])
             )
             figure.supxlabel(f"grey: {', '.join(reasons)}", fontsize=8)
-        for ax in grid.flat[len(panels) :]:
-            ax.remove()
-        for column in range(columns):
-            below = [ax for ax in grid[:, column] if ax.figure is not None]
-            below[-1].set_xlabel("time $t$ / s")
-            below[-1].xaxis.set_tick_params(labelbottom=True)
+        for below in axes[-_COLUMNS:]:
+            below.set_xlabel("time $t$ / s")
+            below.xaxis.set_tick_params(labelbottom=True)
     return figure
+
+
+def _fig4_axes(figure: Canvas, count: int) -> list[Axes]:
+    """Axes in rows that share their time; ticks without numbers."""
+    width, height = size_of(figure)
+    # Margins in inches: the same at any size, and much faster than a layout engine.
+    margins = {
+        "left": 0.68 / width,
+        "right": 1 - 0.12 / width,
+        "bottom": 0.55 / height,
+        "top": 1 - 0.3 / height,
+    }
+    grid = cells(figure, -(-count // _COLUMNS), _COLUMNS, wspace=0.3, hspace=0.2, **margins)
+    axes: list[Axes] = []
+    for rect in [*itertools.chain(*grid)][:count]:
+        axes.append(figure.add_axes(rect, sharex=axes[0] if axes else None))
+        axes[-1].xaxis.set_tick_params(labelbottom=False)
+    return axes
 
 
 def fig4_panels(data: xr.Dataset) -> list[Panel]:
@@ -245,9 +260,9 @@ def _second_forces(data: xr.Dataset) -> Panel:
     if "constraint" in data:
         values = data["constraint"].to_numpy()
         curves = tuple(f"$f_{{c,{i + 1}}}$" for i in range(values.shape[1]))
-        # Kind A-E stands first; D keeps the angle between two directions, E compares two legs' moments.
+        # Kind A-E stands first; D keeps the angle between two directions, all others a length [T9].
         kinds = [str(row)[0] for row in data["constraint_row"].to_numpy()]
-        units = {{"D": "N m", "E": "N m$^{-1}$"}.get(kind, "N") for kind in kinds}
+        units = {"N m" if kind == "D" else "N" for kind in kinds}
         return Panel("constraint $f_c$", " or ".join(sorted(units)), values, curves)
     return in_kilo(Panel("actuator power", "W", data["actuator_power"].to_numpy()[:, None], ("$P$",)))
 

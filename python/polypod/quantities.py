@@ -2,48 +2,76 @@
 
 from __future__ import annotations
 
-import math
 import re
+from collections.abc import Sequence
 
 from polypod.errors import WorkspaceError, alternatives
-from polypod.units import UNITS, to_si
+from polypod.units import KIND_OF_COORDINATE, UNITS, to_si
 
-_KIND_OF = {unit: kind for kind in ("length", "angle") for unit in UNITS[kind]}
+_KINDS = {**KIND_OF_COORDINATE, **dict.fromkeys(("azimuth", "tilt", "torsion"), "angle")}
+_EXAMPLES = {"length": "20mm", "angle": "10deg", None: "0.3"}
 
 
-def quantity(place: str, text: str) -> float:
-    """A number with or without a unit in SI. Raises WorkspaceError, naming the place."""
+def quantity(place: str, text: str, kind: str | None) -> float:
+    """A number with or without a unit in SI.
+
+    Args:
+        place: such as `--step`, for messages.
+        text: what was typed.
+        kind: "length", "angle", or None for a pure number.
+
+    Raises:
+        WorkspaceError: no such thing, or a unit of another kind; it names the place.
+    """
+    number, unit = _parted(place, text, _EXAMPLES[kind])
+    if not unit:
+        return number
+    if kind is None:
+        raise WorkspaceError(f"{place} is {text!r}; must be a number without a unit")
+    if unit not in UNITS[kind]:
+        raise WorkspaceError(f"{place}: {unit!r} is no unit of {kind}; {alternatives(unit, UNITS[kind])}")
+    return to_si(number, kind, unit)
+
+
+def _parted(place: str, text: str, example: str) -> tuple[float, str]:
+    """The number, and its unit or nothing."""
     found = re.fullmatch(r"\s*([-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*([a-zA-Z]*)\s*", text)
     try:
         if found is None:
             raise ValueError
-        number = float(found[1])
+        return float(found[1]), found[2]
     except ValueError:
-        raise WorkspaceError(f"{place} is {text!r}; must be a number such as 20mm, 10deg or 0.3") from None
-    if not found[2]:
-        return number
-    if found[2] not in _KIND_OF:
-        raise WorkspaceError(f"{place}: {found[2]!r} is no unit; {alternatives(found[2], _KIND_OF)}")
-    value = to_si(number, _KIND_OF[found[2]], found[2])
-    return value if math.isfinite(value) else number
+        raise WorkspaceError(f"{place} is {text!r}; must be a number such as {example}") from None
+
+
+def kind_of(option: str, name: str) -> str | None:
+    """What a coordinate is: "length", "angle", or None for a pure number.
+
+    Raises WorkspaceError for a name that is no coordinate of any mechanism.
+    """
+    if name not in _KINDS:
+        raise WorkspaceError(f"{option}: {name!r} is no coordinate; {alternatives(name, _KINDS)}")
+    return _KINDS[name]
 
 
 def named(option: str, text: str) -> tuple[str, float]:
-    """`name=value`."""
+    """`name=value` of a coordinate."""
     name, mark, value = text.partition("=")
-    if not mark or not name.strip():
+    name = name.strip()
+    if not mark or not name:
         raise WorkspaceError(f"{option} is {text!r}; must be name=value, such as alpha=10deg")
-    return name.strip(), quantity(f"{option} {name.strip()}", value)
+    return name, quantity(f"{option} {name}", value, kind_of(option, name))
 
 
 def interval(option: str, text: str) -> tuple[str, tuple[float, float]]:
-    """`name=from:to`."""
+    """`name=from:to` of a coordinate."""
     name, mark, values = text.partition("=")
+    name = name.strip()
     low, colon, high = values.partition(":")
-    if not (mark and colon and name.strip()):
+    if not (mark and colon and name):
         raise WorkspaceError(f"{option} is {text!r}; must be name=from:to, such as z=200mm:900mm")
-    place = f"{option} {name.strip()}"
-    return name.strip(), (quantity(place, low), quantity(place, high))
+    place, kind = f"{option} {name}", kind_of(option, name)
+    return name, (quantity(place, low, kind), quantity(place, high, kind))
 
 
 def names_of(text: str) -> list[str]:
@@ -51,10 +79,22 @@ def names_of(text: str) -> list[str]:
     return [name.strip() for name in text.split(",") if name.strip()]
 
 
-def steps_of(texts: list[str]) -> float | dict[str, float] | None:
-    """One step for all, or one for each name. Raises WorkspaceError for a mixture."""
+def steps_of(texts: Sequence[str], names: Sequence[str]) -> float | dict[str, float] | None:
+    """One step for all coordinates of these names, or one for each that is named.
+
+    Raises WorkspaceError for a mixture, and for one step where the coordinates differ in kind.
+    """
     if not texts:
         return None
-    if len(texts) == 1 and "=" not in texts[0]:
-        return quantity("--step", texts[0])
-    return dict(named("--step", text) for text in texts)
+    if len(texts) > 1 or "=" in texts[0]:
+        return dict(named("--step", text) for text in texts)
+    text, kinds = texts[0], {name: kind_of("--vary", name) for name in names}
+    first, *others = {*kinds.values()}
+    if not others:
+        return quantity("--step", text, first)
+    _, unit = _parted("--step", text, "20mm or 10deg")
+    meant = [name for name, kind in kinds.items() if kind is not None and unit in UNITS[kind]]
+    raise WorkspaceError(
+        f"--step is {text!r}, but {', '.join(names)} differ in kind: name the coordinate, such as "
+        + " ".join(f"--step {name}={text if meant else _EXAMPLES[kinds[name]]}" for name in meant or names)
+    )

@@ -11,7 +11,7 @@ from polypod import _core
 from polypod.boundary import Cuts
 from polypod.errors import WorkspaceError
 from polypod.mechanism import Mechanism
-from polypod.regions import bounds_of, check_threads, grid_of, start_of
+from polypod.regions import bounds_of, check_threads, grid_of, own_coordinates, start_of
 from polypod.workspace import EDGE_OF_GRID, NO_POSE, SINGULARITY, Workspace, enclosed, label_names, with_floor
 
 CELLS = 64
@@ -49,9 +49,10 @@ def reachable(
         threads,
     )
     if flood is None:
+        own = f", or a slice over {', '.join(own_coordinates(mech))}" if mech.dof in (2, 3) else ""
         raise WorkspaceError(
             f"start: from o at {_place(pose[:3, 3])} the nearest node of the grid cannot be reached within "
-            "the limits; a smaller step or another start may help"
+            f"the limits; a smaller step or another start may help{own}"
         )
     inside = 1
     while new := flood.wave() or flood.retry():

@@ -116,6 +116,11 @@ def bounds_of(
     return result
 
 
+def own_coordinates(mech: Mechanism) -> tuple[str, ...]:
+    """As many pose coordinates as there are freedoms: those that determine the others best at home."""
+    return mech.equations_of_motion(mech.home, np.zeros(6), "pose").coordinates
+
+
 def _interval(name: str, ends: Sequence[float]) -> tuple[float, float]:
     try:
         low, high = (float(end) for end in ends)

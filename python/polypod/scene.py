@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from trimesh import Trimesh
 
 from polypod.bodies import JOINT, Link, leg_radii, link_frames, links_of
+from polypod.canvas import size_of
 from polypod.mechanism import Mechanism
 from polypod.solids import four_sided, tube
 from polypod.style import INK
@@ -206,7 +207,7 @@ def frame(ax: Axes3D, corners: Array, half: Array, zoom: float | None = None) ->
     ax.set_proj_type("persp", focal_length=1.6)
     ax.view_init(elev=_ELEVATION, azim=_AZIMUTH)
     center, scale = (corners.min(axis=0) + corners.max(axis=0)) / 2, zoom or 1.0
-    cell = ax.get_position(original=True).size * ax.get_figure(root=True).get_size_inches()
+    cell = ax.get_position(original=True).size * size_of(ax.get_figure(root=False))
     for _ in range(4):  # perspective: each step is a little off
         for i, name in enumerate("xyz"):
             getattr(ax, f"set_{name}lim")(center[i] - half[i], center[i] + half[i])

@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from polypod.canvas import pyplot_figure
 from polypod.errors import PolypodError, UnknownNameError
 from polypod.mechanism import Mechanism
 from polypod.results import Solution
@@ -200,11 +200,3 @@ def stroke_of(data: xr.Dataset) -> tuple[float, ...]:
         return ()
     limits = np.unique(Mechanism.from_toml(text).stroke, axis=0)
     return tuple(1e3 * limits[0]) if len(limits) == 1 and np.isfinite(limits).all() else ()
-
-
-def pyplot_figure(size: tuple[float, float], **more: Any) -> Figure:
-    """A figure of that size in inches, which pyplot knows."""
-    # Here, so that those who bring their own figure need no screen and no pyplot.
-    from matplotlib import pyplot
-
-    return pyplot.figure(figsize=size, **more)

@@ -17,8 +17,8 @@ from scipy.optimize import brentq
 
 from polypod import _core
 from polypod.answers import ForwardDynamics, State
-from polypod.arrays import check_wrench_axes
-from polypod.errors import PolypodError, ShapeError, UnknownNameError
+from polypod.arrays import check_wrench_axes, doubles
+from polypod.errors import PolypodError, UnknownNameError
 from polypod.mechanism import Mechanism
 from polypod.passages import sampled_passages
 from polypod.results import Solution
@@ -81,7 +81,9 @@ def simulate(
         if name not in STOPS:
             raise UnknownNameError("event to stop at", name, STOPS)
     drive = _Drive(mech, forces, wrench, wrench_axes)
-    start = _Instant(0.0, _array("pose", pose, (4, 4)), _array("twist", twist, (6,)))
+    start = _Instant(
+        0.0, doubles("pose", pose, (4, 4), batch=False), doubles("twist", twist, (6,), batch=False)
+    )
     status = Status(int(drive.dynamics([start]).status[0]))
     if not status.has_answer:
         raise PolypodError(f"the state at the start, pose and twist: {status.message}")
@@ -140,27 +142,17 @@ def _law(name: str, given: Input, width: int) -> Callable[[float, Array, Array],
         law = given
 
         def called(time: float, pose: Array, twist: Array) -> Array:
-            return _array(f"{name} at {time:g} s", law(time, pose, twist), (width,))
+            return doubles(f"{name} at {time:g} s", law(time, pose, twist), (width,), batch=False)
 
         return called
     if isinstance(given, tuple) and len(given) == 2 and np.ndim(given[0]) == 1:
         at = np.asarray(given[0], dtype=np.float64)
-        rows = _array(name, given[1], (len(at), width))
+        rows = doubles(name, given[1], (len(at), width), batch=False)
         if not (np.diff(at) > 0.0).all():
             raise PolypodError(f"{name}: its times must increase")
         return lambda time, pose, twist: np.array([np.interp(time, at, column) for column in rows.T])
-    constant = _array(name, given, (width,))  # type: ignore[arg-type]
+    constant = doubles(name, given, (width,), batch=False)  # type: ignore[arg-type]
     return lambda time, pose, twist: constant
-
-
-def _array(name: str, value: ArrayLike, shape: tuple[int, ...]) -> Array:
-    try:
-        array = np.asarray(value, dtype=np.float64, order="C")
-    except (TypeError, ValueError) as error:
-        raise ShapeError(f"{name} is not an array of numbers: {error}") from None
-    if array.shape != shape:
-        raise ShapeError(f"{name} has the shape {array.shape}; needs {shape}")
-    return array
 
 
 # --- integration --------------------------------------------------------------------------------------------

@@ -53,9 +53,10 @@ class Singularity(Answer):
     uncontrolled: Kinds
     """(...): freedoms that the locked actuators leave; -1 where not known."""
     twist: Array
-    """(..., 6): the allowed twist at o that the legs notice least; (v, Λω) has the length 1 m/s.
+    """(..., 6): the allowed twist at o that the legs notice least, m/s and rad/s.
 
-    No leg notices it where `uncontrolled` is not 0; it is one of several where that exceeds 1.
+    (v, Λω) has the length 1 m/s. No leg notices it where `uncontrolled` is not 0; it is one of several where
+    that exceeds 1.
     """
     axis: Array
     """(..., 3): direction of that twist's axis; of its translation where the pitch is infinite."""
@@ -64,6 +65,7 @@ class Singularity(Answer):
     point: Array
     """(..., 3): the axis's point nearest to o, m; o for a pure translation."""
     status: Codes
+    """(...): `Status` of each state."""
 
     _variables: ClassVar = {
         "determinant": "determinant",
@@ -89,10 +91,11 @@ class Determinant(Answer):
     """det J in pure numbers along a motion [T30]."""
 
     determinant: Array
-    """(...)."""
+    """(...): det J; its sign tells the aspect."""
     rate: Array
     """(...): exact rate along the twist, 1/s."""
     status: Codes
+    """(...): `Status` of each state."""
 
     _variables: ClassVar = {
         "determinant": "determinant",
@@ -108,19 +111,21 @@ class SingularityDistance(Answer):
     coordinates: tuple[str, ...]
     """Names of the k coordinates."""
     value: Array
-    """(..., k): their values at the pose."""
+    """(..., k): their values at the pose, m or rad."""
     singular: Array
-    """(..., k, 2): the nearest singular value below and above; -inf and inf where there is none in reach."""
+    """(..., k, 2): the nearest singular value below and above, m or rad; -inf and inf where there is none in
+    reach."""
     distance: Array
-    """(..., k, 2): |singular - value|."""
+    """(..., k, 2): |singular - value|, m or rad."""
     kind: Kinds
     """(..., k, 2): `SingularityKind` there; NONE where there is none in reach.
 
     UNKNOWN where det J changes its sign, but no singular pose is known.
     """
     searched: Array
-    """(..., k, 2): value up to which poses were looked at: the reach, or where poses end."""
+    """(..., k, 2): value up to which poses were looked at, m or rad: the reach, or where poses end."""
     status: Codes
+    """(...): `Status` of each state."""
 
     _variables: ClassVar = {
         "value": "coordinate_value",

@@ -375,7 +375,7 @@ def range_mm(limits: list[float | None]) -> str:
 
 def fixed(value: float | None, scale: float = 1.0) -> str:
     """One decimal, as readings have."""
-    return "none" if value is None else f"{scale * value:.1f}"
+    return "none" if value is None else f"{scale * value:z.1f}"
 
 
 def significant(value: float | None, digits: int = 3) -> str:

@@ -9,12 +9,12 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.colors import to_rgb
-from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import PathPatch
 from matplotlib.path import Path as Outline
 from numpy.typing import NDArray
 
+from polypod.canvas import Canvas, cells, pyplot_figure, size_of
 from polypod.errors import UnknownNameError, WorkspaceError
 from polypod.style import INK, PALE, house_style
 from polypod.workspace import Workspace
@@ -48,22 +48,24 @@ VIEWS = {"top": (0, 1), "side": (1, 2), "front": (0, 2)}
 _ELEVATION, _AZIMUTH = math.radians(24.0), math.radians(-60.0)
 
 
-def plot_workspace(workspace: Workspace, figure: Figure | None = None) -> Figure:
+def plot_workspace(workspace: Workspace, figure: Canvas | None = None) -> Canvas:
     """Top, side, front and isometric view of a workspace, as in Fig. 3; of two coordinates the outline.
 
     The colour tells what ends the workspace: a limit of a leg has the colour of the leg, paler for the least
     value. Lengths are in mm, angles in degrees.
+
+    Args:
+        workspace: what to draw.
+        figure: a figure or a subfigure to draw on.
     """
     with house_style():
-        if figure is None:
-            from matplotlib import pyplot
-
-            figure = pyplot.figure(figsize=(8.0, 7.4) if len(workspace.names) == 3 else (5.6, 5.2))
+        figure = figure or pyplot_figure((8.0, 7.4) if len(workspace.names) == 3 else (5.6, 5.2))
         if len(workspace.names) == 3:
             _draw_views(workspace, figure)
         else:
-            low = (0.75 + 0.17 * _legend(workspace, figure)) / figure.get_size_inches()[1]
-            _draw_outline(figure.add_axes((0.13, low, 0.84, 0.97 - low)), workspace)
+            low = (0.75 + 0.17 * _legend(workspace, figure)) / size_of(figure)[1]
+            [[cell]] = cells(figure, 1, 1, left=0.13, right=0.97, bottom=low, top=0.97)
+            _draw_outline(figure.add_axes(cell), workspace)
     return figure
 
 
@@ -90,9 +92,7 @@ def plot_workspace_view(
         raise UnknownNameError("view", view, (*VIEWS, "isometric"))
     with house_style():
         if ax is None:
-            from matplotlib import pyplot
-
-            ax = pyplot.figure(figsize=(5.6, 4.0), layout="constrained").add_subplot()
+            ax = pyplot_figure((5.6, 4.0), layout="constrained").add_subplot()
         if space:
             _draw_view(ax, workspace, view)
         else:
@@ -112,13 +112,14 @@ def _scaled(workspace: Workspace) -> tuple[Array, list[str]]:
     return workspace.vertices * [factor for factor, _ in scales], texts
 
 
-def _draw_views(workspace: Workspace, figure: Figure) -> None:
+def _draw_views(workspace: Workspace, figure: Canvas) -> None:
     points, _ = _scaled(workspace)
-    low = (0.75 + 0.17 * _legend(workspace, figure)) / figure.get_size_inches()[1]
+    low = (0.75 + 0.17 * _legend(workspace, figure)) / size_of(figure)[1]
     spans = np.ptp(points, axis=0) if _in_one_unit(workspace) else np.ones(3)
-    cells = figure.add_gridspec(
-        nrows=2,
-        ncols=2,
+    (top, isometric), (front, side) = cells(
+        figure,
+        2,
+        2,
         width_ratios=[spans[0], spans[1]],
         height_ratios=[spans[1], spans[2]],
         left=0.09,
@@ -129,9 +130,9 @@ def _draw_views(workspace: Workspace, figure: Figure) -> None:
         hspace=0.27,
     )
     # Each view has the one that shares its axis beside or below it.
-    places = {"top": (0, 0), "side": (1, 1), "front": (1, 0), "isometric": (0, 1)}
+    places = {"top": top, "side": side, "front": front, "isometric": isometric}
     for letter, (view, cell) in zip("abcd", places.items(), strict=True):
-        ax = figure.add_subplot(cells[cell])
+        ax = figure.add_axes(cell)
         _draw_view(ax, workspace, view)
         ax.set_title(f"({letter})  {view} view")
 
@@ -240,10 +241,10 @@ def _draw_outline(ax: Axes, workspace: Workspace) -> None:
         ax.set_aspect("equal", adjustable="box")
 
 
-def _legend(workspace: Workspace, figure: Figure) -> int:
+def _legend(workspace: Workspace, figure: Canvas) -> int:
     """What ends the workspace, below the picture in rows; the number of rows."""
     handles = _handles(workspace)
-    columns = min(len(handles), max(int(figure.get_size_inches()[0] / 1.55), 1))
+    columns = min(len(handles), max(int(size_of(figure)[0] / 1.55), 1))
     by_column = [handle for column in range(columns) for handle in handles[column::columns]]
     figure.legend(handles=by_column, loc="lower center", ncols=columns, bbox_to_anchor=(0.5, 0.008))
     return -(-len(handles) // columns)

@@ -15,6 +15,7 @@ from polypod.cli.shared import (
     console,
     print_json,
     print_words,
+    print_written,
 )
 
 if TYPE_CHECKING:
@@ -42,8 +43,10 @@ def info(
         _draw(mech, draw)
     if as_json:
         print_json(facts)
-    else:
-        _print_mechanism(console(), facts)
+        return
+    _print_mechanism(console(), facts)
+    if draw is not None:
+        print_written(draw)
 
 
 def _draw(mech: Mechanism, path: Path) -> None:

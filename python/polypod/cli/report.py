@@ -60,7 +60,7 @@ def report(
     if samples is not None and motion is None:
         raise PolypodError("--samples: there is no MOTION to sample")
     mech = load(mechanism)
-    width = None if step is None else quantity("--step", step)
+    width = None if step is None else quantity("--step", step, "length")
     with progress_bar("solving", 1) as progress:
         content = gather(mech, motion, samples=samples, workspace=workspace, step=width, progress=progress)
     save(render(content, _command_line()), output)

@@ -96,7 +96,7 @@ def workspace(
     kind = kind or (Kind.SLICE if names else Kind.REACHABLE)
     _check_workspace_options(kind, names, fix, output, draw, bounds, keep_aspect)
     mech = load(mechanism)
-    widths = steps_of(step or [])
+    widths = steps_of(step or [], names or ("x", "y", "z"))
     if kind is Kind.LATTICE:
         if isinstance(widths, dict):
             raise WorkspaceError(

@@ -28,6 +28,8 @@ class Chart:
     """Whether its axis is logarithmic."""
     dots: bool = False
     """Whether its values are drawn without lines between them."""
+    least: float = 0.0
+    """Size below which values are rounding, in the panel's unit: its axis never shows less."""
 
 
 @dataclass
@@ -54,6 +56,7 @@ class Series:
                 "time": self._time(chart.time[at]),
                 "log": chart.log,
                 "dots": chart.dots,
+                "least": chart.least,
                 "levels": [*panel.limits],
                 "curves": [
                     {
@@ -72,7 +75,7 @@ class Series:
             "label": label,
             "curves": curves,
             # Long names stand one below the other.
-            "wide": any(len(Markup(curve["name"]).striptags()) > 9 for curve in curves),
+            "wide": len(curves) == 1 or any(len(Markup(curve["name"]).striptags()) > 9 for curve in curves),
         }
 
     def _time(self, time: Array) -> int:

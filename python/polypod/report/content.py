@@ -14,6 +14,7 @@ from polypod.mechanism import Mechanism, load
 from polypod.motion import Motion
 from polypod.paper import MECHANISM
 from polypod.paper_tables import TABLE_II, table_i_markdown, table_iii_markdown
+from polypod.regions import own_coordinates
 from polypod.report.inputs import MotionSource, Source, mechanism_source, read_motion
 from polypod.report.reactions import Reactions, reactions_along
 from polypod.results import Solution
@@ -93,7 +94,11 @@ def along_of(mech: Mechanism, solution: Solution, source: Source) -> Along:
 def workspace_of(
     mech: Mechanism, wanted: Workspace | bool, step: float | None
 ) -> tuple[Workspace | None, str]:
-    """The reachable workspace, or why there is none."""
+    """The reachable workspace, or why there is none.
+
+    Where o does not move freely in space, as that of a 3-RPS, no grid of its positions can be followed. Two
+    or three freedoms then have a slice over their own coordinates, which leaves nothing out.
+    """
     if isinstance(wanted, Workspace):
         return wanted, ""
     if not wanted:
@@ -103,7 +108,11 @@ def workspace_of(
     except PolypodError as error:
         if step is not None:
             raise
-        return None, f"None was found: {error}."
+        why = f"None was found: {error}."
+    try:
+        return (mech.workspace(own_coordinates(mech)), "") if mech.dof in (2, 3) else (None, why)
+    except PolypodError:
+        return None, why
 
 
 def paper_tables(mech: Mechanism, motion: Motion | None) -> list[tuple[str, str]]:

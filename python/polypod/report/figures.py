@@ -54,14 +54,16 @@ def poses_picture(mech: Mechanism, solution: Solution) -> Picture | None:
     # From the first to the last but one of evenly spread instants: a closed motion ends where it began.
     at = np.unique(known[np.linspace(0, known.size - 1, POSES + 1).astype(int)[:POSES]])
     captions = {f"$t$ = {time[i]:g} s": poses[i] for i in at}
-    figure = plot_poses(mech, captions, Figure(figsize=(3.1 * len(captions), 3.4)))
+    figure = Figure(figsize=(3.1 * len(captions), 3.4))
+    plot_poses(mech, captions, figure)
     return Picture(_address(figure), f"The mechanism at {len(captions)} instants of its motion")
 
 
 def workspace_picture(workspace: Workspace) -> Picture:
-    """Views of a workspace along the axes."""
-    figure = plot_workspace(workspace, Figure(figsize=(8.0, 7.4)))
-    return Picture(_address(figure), "The reachable workspace from above, from the side and from the front")
+    """Views of a workspace along the axes, or its outline."""
+    figure = Figure(figsize=(8.0, 7.4))
+    plot_workspace(workspace, figure)
+    return Picture(_address(figure), f"The workspace in {', '.join(workspace.names)}")
 
 
 def _address(figure: Figure) -> str:

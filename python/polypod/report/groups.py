@@ -26,6 +26,9 @@ INSTANTS = 201
 NEAREST_LIMITS = 5
 """Limits whose slack is drawn: those that come nearest."""
 
+_ROUNDING = 1e-9
+"""Reactions so much smaller than the largest force, or its torque at the characteristic length: rounding."""
+
 _COMPONENTS = "xyz"
 
 
@@ -89,13 +92,17 @@ def _plain(name: str) -> str:
 def reaction_charts(mech: Mechanism, found: Reactions) -> list[Chart]:
     """Sizes of force and torque for each kind of joint, a curve for each leg or rod."""
     charts = []
+    largest = float(np.max(found.force, initial=0.0, where=np.isfinite(found.force)))
+    least = {"N": _ROUNDING * largest, "N m": _ROUNDING * largest * mech.characteristic_length}
     kinds = ((found.force, "force", "F", "N"), (found.torque, "torque", "T", "N m"))
     for values, name, symbol, unit in kinds:
         for family, indices in families(found):
             of = mech.rod_names if family == "rods" else mech.leg_names
             curves = tuple(f"${symbol}_{{{math_name(owner)}}}$" for owner in of)
             panel = Panel(f"{name} $|{symbol}|$, {family}", unit, values[:, indices], curves)
-            charts.append(Chart(in_kilo(panel), found.time))
+            shown = in_kilo(panel)
+            floor = least[unit] if shown.unit == unit else 0.0  # what is shown in thousands is no rounding
+            charts.append(Chart(shown, found.time, least=floor))
     return charts
 
 

@@ -11,7 +11,9 @@
     curves: ["#3f97d8", "#e69f00", "#1fb58f", "#f0703a", "#dd92be", "#9ad4f7", "#f2f2f2"],
   };
   const DASHES = ["solid", "6px,2px", "2px,2px", "7px,2px,2px,2px"];
-  const MARGIN = { l: 66, r: 10, t: 8, b: 40 };
+  const MARGIN = { l: 92, r: 10, t: 8, b: 40 };
+  const HEIGHT = 230;
+  const LETTER = 6.4; // width of a letter of a label, about
   const PRINTED = { width: 342, height: 205 };
   const FONT = 'system-ui, -apple-system, "Segoe UI", "Noto Sans", "DejaVu Sans", sans-serif';
   // Named one by one, because some that are there by default lead to a service elsewhere.
@@ -72,12 +74,26 @@
     });
   }
 
+  /** The label of a chart's values; in two lines if it is longer than the axis. */
+  function label(chart) {
+    const text = chart.about.label;
+    const room = (printing ? PRINTED.height : HEIGHT) - MARGIN.t - MARGIN.b;
+    const plain = text.replace(/<[^>]*>/g, "");
+    if (LETTER * plain.length <= room) return text;
+    // The last words, with the unit, go into the second line.
+    const at = text.includes(", ") ? text.lastIndexOf(", ") + 2 : text.lastIndexOf(" / ") + 1;
+    return at > 1 ? `${text.slice(0, at)}<br>${text.slice(at)}` : text;
+  }
+
   function layout(chart, colors) {
     const axis = {
       gridcolor: colors.line, linecolor: colors.muted, tickcolor: colors.muted, zeroline: false, showline: true,
       ticks: "outside", ticklen: 3, tickfont: { size: 11 }, automargin: false,
     };
     const levels = chart.about.log ? [] : chart.about.levels;
+    const least = chart.about.least; // smaller values are rounding: no axis is stretched for them
+    const largest = (values) => values.reduce((most, value) => Math.max(most, Math.abs(value) || 0), 0);
+    const size = Math.max(...chart.curves.map(largest));
     return {
       margin: MARGIN, showlegend: false, hovermode: "x", hoverdistance: -1, dragmode: "zoom",
       paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)",
@@ -86,7 +102,8 @@
       xaxis: { ...axis, range: [...range], title: { text: "time <i>t</i> / s", standoff: 6, font: { size: 11.5 } } },
       yaxis: {
         ...axis, type: chart.about.log ? "log" : "linear", exponentformat: "power", showexponent: "all",
-        nticks: 6, title: { text: chart.about.label, standoff: 6, font: { size: 11.5 } },
+        nticks: 6, ...(size < least ? { range: [-least, least] } : {}),
+        title: { text: label(chart), standoff: 4, font: { size: 11.5 } },
       },
       shapes: [
         ...data.marks.map((mark) => ({

@@ -25,7 +25,7 @@ from polypod.report.decimate import POINTS, spans
 from polypod.report.inputs import MotionSource, versions
 from polypod.report.reactions import reactions_table
 from polypod.report.space import workspace_figure
-from polypod.report.words import actuators_table, glance, outcomes, warnings
+from polypod.report.words import actuators_table, glance, outcomes, warnings, workspace_words
 from polypod.results import replacing
 from polypod.workspace import Workspace
 
@@ -172,7 +172,6 @@ def _motion(mech: Mechanism, along: Along, series: Series) -> dict[str, Any]:
         "actuator_charts": shown(groups.actuator_charts(mech, solution)),
         "reactions": reactions_table(along.reactions),
         "reaction_charts": shown(groups.reaction_charts(mech, along.reactions)),
-        "looked_at": (len(along.reactions.time), along.reactions.of),
         "undetermined": bool(along.reactions.undetermined.any()),
         "singularity_charts": shown(groups.singularity_charts(mech, solution)),
         "legs": [(name, shown(groups.leg_charts(data, i))) for i, name in enumerate(mech.leg_names)],
@@ -186,9 +185,11 @@ def _workspace(content: Content) -> dict[str, Any]:
         return {"why": content.no_workspace}
     path = None if content.along is None else path_of_o(content.along.solution)
     facts = found.facts()
+    of_o = found.names == ("x", "y", "z")
     return {
         "why": "",
-        "figure": json.loads(workspace_figure(found, path)),
+        "words": workspace_words(facts),
+        **({"figure": json.loads(workspace_figure(found, path))} if of_o else {}),
         "picture": figures.workspace_picture(found),
         "extents": tables.extents_table(facts),
         "ends": tables.ends_table(facts),

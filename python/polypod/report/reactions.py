@@ -9,15 +9,11 @@ from numpy.typing import NDArray
 
 from polypod.answers import Joint
 from polypod.mechanism import Mechanism
-from polypod.report.decimate import kept
 from polypod.results import Solution
 from polypod.solution import CHUNK
 from polypod.tables import Table, fixed
 
 Array = NDArray[np.float64]
-
-STATES = 20_000
-"""States that are looked at, at most, about: reactions take much longer than all other quantities."""
 
 COMPONENTS = ("force 1", "force 2", "force 3", "torque 1", "torque 2", "torque 3")
 """Of a reaction in joint axes, as in the variables of a solution."""
@@ -25,12 +21,10 @@ COMPONENTS = ("force 1", "force 2", "force 3", "torque 1", "torque 2", "torque 3
 
 @dataclass(frozen=True)
 class Reactions:
-    """Reactions without couples in U joints [T47] of j joints at N instants, as sizes."""
+    """Reactions without couples in U joints [T47] of j joints at the N instants of a motion, as sizes."""
 
     time: Array
     """(N,), s."""
-    of: int
-    """Number of all states; of a long motion N are looked at."""
     joints: tuple[Joint, ...]
     force: Array
     """(N, j): |F|, N."""
@@ -41,34 +35,22 @@ class Reactions:
 
 
 def reactions_along(mech: Mechanism, solution: Solution) -> Reactions:
-    """The reactions, some states at a time: only their sizes are kept.
-
-    Of a motion with more than `STATES` states those are taken that are spread evenly over it, and those at
-    which active forces are least and greatest nearby.
-    """
+    """The reactions, some states at a time: only their sizes are kept."""
     data = solution.dataset
-    at = _chosen(data["force"].to_numpy())
+    time, joints, axes = data["time"].to_numpy(), mech.joint_list, data.attrs["wrench_axes"]
     pose, twist, acceleration, wrench = (
-        data[name].to_numpy()[at] for name in ("pose", "twist", "acceleration", "wrench")
+        data[name].to_numpy() for name in ("pose", "twist", "acceleration", "wrench")
     )
-    axes, count = data.attrs["wrench_axes"], len(at)
-    joints = mech.joint_list
-    force, torque = np.full((2, count, len(joints)), np.nan)
+    force, torque = np.full((2, len(time), len(joints)), np.nan)
     undetermined = np.zeros((len(joints), 6), dtype=np.bool_)
-    for start in range(0, count, CHUNK):
+    for start in range(0, len(time), CHUNK):
         chunk = slice(start, start + CHUNK)
         answer = mech.joint_reactions(pose[chunk], twist[chunk], acceleration[chunk], wrench[chunk], axes)
         force[chunk] = np.linalg.norm(answer.reactions[..., :3], axis=-1)
         torque[chunk] = np.linalg.norm(answer.reactions[..., 3:], axis=-1)
         known = np.isfinite(answer.reactions).all(axis=(-2, -1))
         undetermined |= ~answer.determinate_in_joint[known].all(axis=0)
-    return Reactions(data["time"].to_numpy()[at], len(data["time"]), joints, force, torque, undetermined)
-
-
-def _chosen(forces: Array) -> NDArray[np.int64]:
-    """Indices of the states that are looked at."""
-    even = np.linspace(0, len(forces) - 1, min(STATES // 2, len(forces))).astype(np.int64)
-    return np.union1d(even, kept(forces, STATES // 2)) if len(forces) > STATES else np.arange(len(forces))
+    return Reactions(time, joints, force, torque, undetermined)
 
 
 def reactions_table(found: Reactions) -> Table:

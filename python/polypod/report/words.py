@@ -6,7 +6,7 @@ from typing import Any
 
 from polypod.report.content import Along, Content
 from polypod.tables import Table, fixed, outcome, range_mm, significant
-from polypod.units import readable
+from polypod.units import coordinate_unit, readable
 
 
 def warnings(content: Content) -> list[str]:
@@ -55,8 +55,22 @@ def glance(content: Content) -> list[tuple[str, str]]:
         found += _of_motion(content.along)
     if content.workspace is not None:
         volume = content.workspace
-        found.append(("workspace", f"{volume.volume:.3g} {volume.volume_unit}".replace("^3", "³")))
+        found.append(
+            ("workspace", f"{volume.volume:.3g} {volume.volume_unit}".replace("^3", "³").replace("^2", "²"))
+        )
     return found
+
+
+def workspace_words(facts: dict[str, Any]) -> str:
+    """What the workspace is, in one sentence."""
+    if facts["kind"] == "reachable":
+        return "All positions of o that can be reached inside all limits, whatever the orientation."
+    *names, last = facts["extents"]
+    fixed = ", ".join(
+        f"{name} = {readable(value, coordinate_unit(name))}" for name, value in facts["fixed"].items()
+    )
+    at = f" at {fixed}" if fixed else ""
+    return f"All values that {', '.join(names)} and {last} can take together inside all limits{at}."
 
 
 def _of_motion(along: Along) -> list[tuple[str, str]]:
@@ -66,7 +80,8 @@ def _of_motion(along: Along) -> list[tuple[str, str]]:
     found = [("motion", f"{facts['end'] - facts['start']:g} s, {facts['states']} states")]
     for name, rows, unit in (("peak force", peaks, "N"), ("peak power of an actuator", powers, "W")):
         if rows:
-            found.append((name, f"{max(abs(row['peak']) for row in rows):.0f} {unit}"))
+            peak = max(abs(row["peak"]) for row in rows)
+            found.append((name, f"{f'{peak:.0f}' if peak >= 100.0 else significant(peak)} {unit}"))
     if nearest := facts["nearest_to_singular"]:
         found.append(("smallest singular value", significant(nearest["sigma_min"])))
     if facts["without_answer"]:

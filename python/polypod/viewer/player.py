@@ -13,8 +13,8 @@ from polypod.motion import Motion
 
 Array = NDArray[np.float64]
 
-MOST_ROWS = 4000
-"""Rows of a motion that the page keeps."""
+MOST_ROWS = 30_000
+"""Rows of a motion that the page keeps: thirty a second for a quarter of an hour."""
 
 _CHUNK = 20_000
 """Rows whose poses are found at a time."""

@@ -37,6 +37,9 @@ ARROW = 1.8
 ELEVATION, AZIMUTH = np.radians(19.0), np.radians(-62.0)
 """Where the camera stands at first: as in the figures."""
 
+FLAT, ABOVE = 0.35, np.radians(50.0)
+"""A machine that is lower than so much of its width, and from where above it is seen then."""
+
 FIELD_OF_VIEW = np.radians(40.0)
 
 _CREASE = np.radians(30.0)
@@ -180,6 +183,7 @@ def furnish(server: viser.ViserServer, model: Model, frames: Array) -> None:
         if np.isfinite(frame).all()
         for piece in link.pieces
     ]
+    extent = np.ptp(np.concatenate(corners), axis=0)
     if model.track is not None and len(model.track.positions):
         around = model.mech.characteristic_length
         corners += [model.track.positions - around, model.track.positions + around]
@@ -203,8 +207,9 @@ def furnish(server: viser.ViserServer, model: Model, frames: Array) -> None:
     server.scene.add_light_hemisphere(
         "/sky", sky_color=(255, 255, 255), ground_color=(170, 175, 185), intensity=1.6
     )
+    elevation = ABOVE if extent[2] < FLAT * extent[:2].max() else ELEVATION
     way = np.array(
-        [np.cos(ELEVATION) * np.cos(AZIMUTH), np.cos(ELEVATION) * np.sin(AZIMUTH), np.sin(ELEVATION)]
+        [np.cos(elevation) * np.cos(AZIMUTH), np.cos(elevation) * np.sin(AZIMUTH), np.sin(elevation)]
     )
     server.initial_camera.fov = FIELD_OF_VIEW
     server.initial_camera.look_at = (float(middle[0]), float(middle[1]), float(middle[2]))
