@@ -247,7 +247,7 @@ def test_griffis_duffy_is_singular_everywhere() -> None:
     dynamics = mech.inverse_dynamics(pose, twist, acceleration)
     assert set(dynamics.status.tolist()) == {Status.SINGULAR}
     assert np.isnan(dynamics.forces).all()
-    assert mech.platform_twist(pose, np.zeros(6))[1].tolist() == [Status.SINGULAR] * POSES
+    assert mech.platform_twist(pose, np.zeros(6)).status.tolist() == [Status.SINGULAR] * POSES
     lengths = mech.inverse_kinematics(pose).lengths
     assert set(mech.forward_kinematics(lengths, pose).status.tolist()) == {Status.SINGULAR}
     # Only accelerations under given forces are determined: the masses see to that.
