@@ -69,8 +69,9 @@ bench: $(BUILT) ## measure the speed, beside alternatives, and write docs/perfor
 docs: $(BUILT) ## build the site into site/
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
 
-gallery: $(BUILT) ## draw the pictures of the site's gallery again
+gallery: $(BUILT) ## draw the pictures of the site's gallery and catalogue again
 	$(BIN)/python docs/gallery.py
+	$(BIN)/python docs/catalogue.py
 
 wheel: $(DEPS) ## build a wheel for this machine into dist/
 	$(BIN)/maturin build --release $(LOCKED) --out dist

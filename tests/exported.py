@@ -28,16 +28,16 @@ NASTY = {"1": "a/b", "2": "a b", "3": "a_b", "4": "αβ-->", "5": '<5 & "6">'}
 @functools.cache
 def mechanism(name):
     """By name; never changed."""
-    if name == LU:
+    if name in (LU, "ups-hexapod"):
         return pp.load(name)
     if name == "massless":
         return without_masses()
-    return pp.load(DATA / f"{name}.toml") if name in ("ups-hexapod", "3-rps") else cases.case(name).mech
+    return pp.load(DATA / f"{name}.toml") if name == "3-rps" else cases.case(name).mech
 
 
 def without_masses():
     """Six UPS legs whose links have no masses, but for the platform."""
-    tables = pp.load(DATA / "ups-hexapod.toml").to_dict()
+    tables = pp.load("ups-hexapod").to_dict()
     for leg in tables["legs"]:
         leg.pop("cylinder", None)
         leg.pop("piston", None)

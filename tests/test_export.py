@@ -24,7 +24,7 @@ from polypod.export.names import Names, legal
 from polypod.solution import states_along
 
 sys.path.insert(0, str(Path(__file__).parent))
-from exported import DATA, LU, mechanism, nasty, regular_pose
+from exported import LU, mechanism, nasty, regular_pose
 
 SINGLE = 1e-6
 """Of lengths of about a metre in single precision."""
@@ -84,7 +84,7 @@ def test_what_is_left_out_is_said_and_written(name, tmp_path):
 
 
 def test_nothing_left_out_is_not_said(tmp_path):
-    tables = pp.load(DATA / "ups-hexapod.toml").to_dict()
+    tables = pp.load("ups-hexapod").to_dict()
     for key in ("load", "dynamics", "limits"):
         tables.pop(key, None)
     for leg in tables["legs"]:

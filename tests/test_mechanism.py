@@ -227,7 +227,7 @@ def test_bad_input_is_refused_with_its_place_and_nothing_else(case: str, tmp_pat
     path.write_text(tomli_w.dumps(tables), encoding="utf-8")
     with pytest.raises(MechanismError, match=r"bad\.toml has 1 fault:\n") as caught:
         pp.load(path)
-    assert f"\n  {place}: " in str(caught.value)
+    assert re.search(rf"\n  {re.escape(place)}( \(line \d+\))?: ", str(caught.value))
     assert [(f.place, f.message) for f in caught.value.faults] == [fault]
 
 
@@ -319,7 +319,7 @@ def test_a_file_that_is_no_utf_8_is_named(tmp_path: Path) -> None:
 def test_a_missing_file_brings_up_the_likeliest_name(tmp_path: Path) -> None:
     with pytest.raises(UnknownNameError, match=f'"lu-3spu-2rpu"; did you mean "{BUILT_IN}"'):
         pp.load("lu-3spu-2rpu")
-    with pytest.raises(UnknownNameError, match=f"nowhere.toml.*valid: {BUILT_IN}"):
+    with pytest.raises(UnknownNameError, match=f"nowhere.toml.*valid: .*{BUILT_IN}"):
         pp.load(tmp_path / "nowhere.toml")
 
 

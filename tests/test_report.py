@@ -229,7 +229,10 @@ def outside(html: str) -> list[str]:
 
 @pytest.mark.parametrize("name", ["3-rps", "stewart-gough", "ups-hexapod", "tripod"])
 def test_a_report_without_motion(name):
-    mech = pp.Mechanism.from_toml(TRIPOD) if name == "tripod" else pp.load(DATA / f"{name}.toml")
+    if name == "tripod":
+        mech = pp.Mechanism.from_toml(TRIPOD)
+    else:
+        mech = pp.load(name if name == "ups-hexapod" else DATA / f"{name}.toml")
     html = pp.report_html(mech, step=None if name == "3-rps" else 0.15)
     assert f"<h1>{name}</h1>" in html
     assert 'id="workspace"' in html

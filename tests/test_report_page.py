@@ -36,7 +36,7 @@ def paper(tmp_path_factory):
 @pytest.fixture(scope="module")
 def hexapod(tmp_path_factory):
     """The page on a 6-UPS, whose legs leave their strokes in between."""
-    mech = pp.load(DATA / "ups-hexapod.toml")
+    mech = pp.load("ups-hexapod")
     waypoints = {
         **{"x": [0.0, 0.2, -0.2, 0.0], "y": [0.0, 0.1, 0.2, 0.0], "z": [2.0, 2.3, 2.9, 2.0]},
         **{"rx": [0.0, 0.2, -0.2, 0.0], "ry": [0.0, 0.1, 0.2, 0.0], "rz": [0.0, 0.0, 0.3, 0.0]},

@@ -59,6 +59,15 @@ def test_files_of_the_project_are_sound(path: Path) -> None:
     assert data == before
     assert spec["name"] == path.stem
     assert json.loads(json.dumps(spec)) == spec
+
+
+@pytest.mark.parametrize(
+    "path",
+    [BUILT_IN / "lu-3spu-2rpu-r.toml", BUILT_IN / "ups-hexapod.toml", *DATA.glob("*.toml")],
+    ids=lambda path: path.stem,
+)
+def test_strokes_begin_and_end_about_home(path: Path) -> None:
+    spec, _ = read_spec(load(path))
     for length, leg in zip(leg_lengths(spec), spec["legs"], strict=True):
         low, high = leg["stroke"]
         assert abs(length - (low + high) / 2) < 0.15 * (high - low)

@@ -24,7 +24,6 @@ from polypod.verify.pinocchio import Tree, Twin  # noqa: E402
 from verified import exceeding, forget_damping, forget_efficiency, mirror_center, rod_center, turn_gravity  # noqa: E402
 
 COLUMNS = 120
-DATA = Path(__file__).parent / "data"
 LU = "lu-3spu-2rpu-r"
 PUBLISHED = (LU, "ups-hexapod")
 CATALOGUE = (*cases.DRAWN, *cases.FILES)
@@ -35,13 +34,9 @@ NEAR_SINGULAR = (
 ROUNDING = 1e-11  # of the greatest value, where forces are no more than some hundred times the load
 
 
-def mechanism(name):
-    return pp.load(name if name == LU else DATA / f"{name}.toml")
-
-
 def draw_states(name, size):
     """Random states inside all limits, with the loads on them."""
-    mech = mechanism(name)
+    mech = pp.load(name)
     rng = np.random.default_rng([SEED, *name.encode()])
     if name == LU:
         ranges = {"alpha": 0.7, "p": 0.25, "h": 0.1, "beta": 0.8, "gamma": 1.2}
@@ -148,7 +143,7 @@ def test_the_example_motion():
 
 
 def test_rest_and_no_load_are_no_division_by_zero():
-    tables = mechanism("stewart-gough").to_dict()
+    tables = pp.load(cases.DATA / "stewart-gough.toml").to_dict()
     tables |= {"load": {"force": [0, 0, 0]}, "dynamics": {"gravity": [0, 0, 0]}}
     tables["units"]["acceleration"] = "m/s^2"
     mech = pp.Mechanism.from_dict(tables)
@@ -267,7 +262,7 @@ def test_nothing_compared_is_no_agreement():
 
 
 def test_legs_without_length_or_along_their_axis_have_no_answer():
-    tables = mechanism("stewart-gough").to_dict()
+    tables = pp.load(cases.DATA / "stewart-gough.toml").to_dict()
     for end in ("base", "platform"):
         tables["legs"][0][end]["point"] = [250, 0, 0]
     tables["legs"][0]["base"]["axis"] = [1, 0, 0]

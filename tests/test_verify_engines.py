@@ -216,7 +216,7 @@ def test_mujoco_s_own_loops_are_far_off(name):
     if name == LU:
         mech, states = lu_states([1.3])
     else:
-        mech = pp.load(cases.DATA / f"{name}.toml")
+        mech = pp.load(name)
         states = mech.home[None], np.full((1, 6), 0.3), np.full((1, 6), 0.5)
     found = verify_states(mech, *states, engines=["mujoco"])
     default, stiff = quoted_gaps(found)

@@ -18,9 +18,12 @@ class Fault:
 
     place: str
     message: str
+    line: int | None = None
+    """Of the file's text, where there is one and the place is in it."""
 
     def __str__(self) -> str:
-        return f"{self.place}: {self.message}"
+        line = "" if self.line is None else f" (line {self.line})"
+        return f"{self.place}{line}: {self.message}"
 
 
 class _FaultyInputError(PolypodError):

@@ -6,6 +6,7 @@ import copy
 import json
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from functools import cached_property
 from importlib.resources import files
 from pathlib import Path
@@ -51,6 +52,7 @@ from polypod.errors import (
     WorkspaceError,
     alternatives,
 )
+from polypod.lines import line_of
 from polypod.schema import read_spec
 from polypod.singularity import (
     NEAR_SINGULAR,
@@ -58,6 +60,7 @@ from polypod.singularity import (
     Determinant,
     Singularity,
     SingularityDistance,
+    SingularityKind,
     codes,
 )
 from polypod.status import Status
@@ -89,9 +92,10 @@ class Mechanism:
         try:
             self._core = _core.Mechanism(json.dumps(spec))
         except _core.Faults as error:
-            raise MechanismError([*faults, *(Fault(*f) for f in error.args[0])], origin) from None
+            faults += [Fault(*fault) for fault in error.args[0]]
+            raise MechanismError(_found(faults, text), origin) from None
         if faults:
-            raise MechanismError(faults, origin)
+            raise MechanismError(_found(faults, text), origin)
         self._spec = spec
         legs = spec["legs"]
         self.name: str = spec["name"]
@@ -221,6 +225,11 @@ class Mechanism:
                 f"{mobility.uncontrolled} of its freedoms at every pose, so that forces and velocities are "
                 "not determined anywhere."
             )
+        elif self._loses_constraints:
+            notes.append(
+                f"singular at its centre pose, or nearly so; {SingularityKind.CONSTRAINT.message}. "
+                "Forces there are not determined or large; stay clear of it."
+            )
         elif not sigma.sigma_min > NEAR_SINGULAR:
             notes.append(
                 "nearly singular at its centre pose: the smallest singular value is "
@@ -237,7 +246,7 @@ class Mechanism:
             several = mobility.redundant > 1
             notes.append(
                 f"{mobility.redundant} redundant constraint{'s couple' if several else ' couples'} legs "
-                f"{' and '.join(mobility.redundant_legs)}: the parts must be made accurately, and couples in "
+                f"{_in_words(mobility.redundant_legs)}: the parts must be made accurately, and couples in "
                 "these joints are statically indeterminate."
             )
         if mobility.passive:
@@ -246,6 +255,12 @@ class Mechanism:
                 f"({mobility.passive} passive freedoms)."
             )
         return notes
+
+    @property
+    def _loses_constraints(self) -> bool:
+        """Whether the centre pose is a constraint singularity, or near one."""
+        kind = int(self.singularity(self.home, tolerance=NEAR_SINGULAR).kind)
+        return kind in (SingularityKind.CONSTRAINT, SingularityKind.CONSTRAINT_VANISHES)
 
     def mobility(self) -> Mobility:
         """Freedoms, joints, redundant constraints and passive freedoms from generic ranks [Eq. 1, T18]."""
@@ -1149,6 +1164,16 @@ class Mechanism:
 def _by_name(names: Sequence[str], rows: Array) -> dict[str, Array]:
     """The last axis by names; numbers for a single state."""
     return {name: rows[..., i][()] for i, name in enumerate(names)}
+
+
+def _found(faults: Sequence[Fault], text: str | None) -> list[Fault]:
+    """The faults with their lines in the text."""
+    return [fault if text is None else replace(fault, line=line_of(text, fault.place)) for fault in faults]
+
+
+def _in_words(names: Sequence[str]) -> str:
+    """1 and 3; 1, 2 and 3."""
+    return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
 
 
 def _plain(value: Any) -> Any:

@@ -6,14 +6,16 @@ SI units and radians. Numbers that do not exist (no stroke limit, no answer) are
 from __future__ import annotations
 
 import math
-from collections import defaultdict
+from collections import Counter, defaultdict
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from polypod.answers import Mobility
-from polypod.mechanism import Mechanism
+from polypod.freedoms import constraint_wrenches, freedoms
+from polypod.mechanism import Mechanism, list_mechanisms, load
 from polypod.passages import warnings_of
 from polypod.results import Solution
 from polypod.status import Status, count
@@ -52,6 +54,26 @@ def links_by_joints(mobility: Mobility) -> dict[str, tuple[str, ...]]:
     return {link_kind(n): tuple(groups[n]) for n in sorted(groups, reverse=True)}
 
 
+def legs_in_short(letters: Sequence[str]) -> str:
+    """The legs by their joints, alike ones together: 3UPS+UPF."""
+    counts = Counter(letters)
+    return "+".join(f"{n if n > 1 else ''}{leg}" for leg, n in counts.items())
+
+
+def catalogue() -> list[dict[str, Any]]:
+    """All that `polypod list` tells: name, legs, freedoms and description of each built-in mechanism."""
+    return [
+        {
+            "name": name,
+            "legs": legs_in_short(mech.leg_letters),
+            "dof": mech.dof,
+            "description": mech.to_dict().get("description", ""),
+        }
+        for name in list_mechanisms()
+        for mech in (load(name),)
+    ]
+
+
 def describe(mech: Mechanism) -> dict[str, Any]:
     """All that `polypod info` tells about a mechanism."""
     mobility, file = mech.mobility(), mech.to_dict()
@@ -85,6 +107,8 @@ def describe(mech: Mechanism) -> dict[str, Any]:
             }
             for i, (leg, kind) in enumerate(mobility.constraint_rows)
         ],
+        "constraint_wrenches": constraint_wrenches(mech),
+        "freedoms": freedoms(mech),
         "coordinate_sets": mech.coordinate_sets,
         "characteristic_length": mech.characteristic_length,
         "centre_pose": {

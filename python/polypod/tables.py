@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -38,6 +39,8 @@ def mechanism_tables(facts: Facts) -> list[Table]:
         accounting_table(facts),
         topology_table(facts),
         constraints_table(facts),
+        wrenches_table(facts),
+        coupled_table(facts),
         coordinates_table(facts),
         centre_table(facts),
         limits_table(facts),
@@ -113,6 +116,48 @@ def constraints_table(facts: Facts) -> Table:
         for row in facts["constraints"]
     ]
     return Table("Constraints on the platform", ("leg", "kind", "condition", "independent"), rows)
+
+
+def wrenches_table(facts: Facts) -> Table:
+    """What the independent constraints can transmit at the centre pose."""
+    rows = [
+        (
+            row["leg"],
+            row["kind"],
+            "couple" if row["couple"] else "force",
+            _vector(row["moment"] if row["couple"] else row["force"], 3),
+            "" if row["couple"] else _vector(row["moment"], 1, 1e3),
+        )
+        for row in facts["constraint_wrenches"]
+    ]
+    headers = ("leg", "kind", "holds by a", "direction>", "moment of 1 N about o / N mm>")
+    return Table("Constraint wrenches at the centre pose, base axes", headers, rows)
+
+
+def coupled_table(facts: Facts) -> Table:
+    """What follows when one independent coordinate is moved from the centre pose."""
+    rows = []
+    for row in facts["freedoms"]["coupled"]:
+        moved = row["coordinate"]
+        if row["follow"] is None:
+            follow = "not determined there"
+        else:
+            changes = (f"{n} {_signed(c, coordinate_unit(n))}" for n, c in row["follow"].items())
+            follow = ", ".join(changes) or "nothing"
+        rows.append((moved, _signed(row["change"], coordinate_unit(moved)), follow))
+    note = "The other independent coordinates stay where they are." if rows else ""
+    headers = ("moved", "by>", "follow")
+    return Table("Freedoms: independent coordinates, and what follows", headers, rows, note)
+
+
+def _vector(values: Sequence[float], digits: int, factor: float = 1.0) -> str:
+    # + 0.0: never -0.0
+    return ", ".join(f"{round(factor * value, digits) + 0.0:.{digits}f}" for value in values)
+
+
+def _signed(value: float, unit: str) -> str:
+    factor, name = {"m": (1e3, "mm"), "rad": (180 / math.pi, "deg")}[unit]
+    return f"{factor * value:+.2f} {name}"
 
 
 def coordinates_table(facts: Facts) -> Table:

@@ -14,7 +14,9 @@ from polypod.errors import PolypodError
 # so that help comes at once.
 COMMANDS = (
     "demo",
+    "list",
     "info",
+    "new",
     "solve",
     "simulate",
     "fk",

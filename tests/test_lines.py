@@ -1,0 +1,112 @@
+"""Faults of mechanism files point to their lines."""
+
+from __future__ import annotations
+
+import pytest
+
+import polypod as pp
+from polypod.errors import Fault, MechanismError
+from polypod.lines import line_of
+
+BUILT_IN = "exechon"
+
+TEXT = """\
+name = "m"
+
+[units]
+length = "mm"
+
+[[rods]]
+name = "L"
+
+[[legs]]
+"base".joint = "S" # home = 3
+
+[[legs]]
+stroke = { min = 1,
+  max = 2 }
+
+[legs.platform]
+joint = "U"
+
+[legs.platform.cone]
+angle = 3
+"""
+
+
+@pytest.mark.parametrize(
+    ("place", "line"),
+    [
+        ("name", 1),
+        ("units.length", 4),
+        ("units.mass", 3),
+        ("rods.1.name", 7),
+        ("legs.1.base.joint", 10),
+        ("legs.1.platform", 9),
+        ("legs.2", 12),
+        ("legs.2.stroke.max", 13),
+        ("legs.2.platform.joint", 17),
+        ("legs.2.platform.cone.angle", 20),
+        ("legs", None),
+        ("legs.3.stroke", None),
+        ("home", None),
+    ],
+)
+def test_lines_of_places(place: str, line: int | None) -> None:
+    assert line_of(TEXT, place) == line
+
+
+@pytest.mark.parametrize(
+    ("right", "wrong", "place"),
+    [
+        ('length = "mm"', 'length = "m m"', "units.length"),
+        ("mass = 20", "mass = -20", "platform.mass"),
+        ("position = [0, 0, 900]", "position = [0, 900]", "home.position"),
+        ('joint = "S", point = [0, 380, 0]', 'joint = "T", point = [0, 380, 0]', "legs.3.base.joint"),
+        ("radius = 30", "raduis = 30", "legs.1.raduis"),
+        ("piston = { mass = 3", "piston = { mass = 0", "legs.1.piston.mass"),
+    ],
+)
+def test_a_wrong_entry_is_found(right: str, wrong: str, place: str) -> None:
+    text = pp.load(BUILT_IN).to_toml()
+    line = 1 + text[: text.index(right)].count("\n")
+    with pytest.raises(MechanismError) as caught:
+        pp.Mechanism.from_toml(text.replace(right, wrong, 1))
+    assert {fault.place for fault in caught.value.faults} == {place}
+    assert {fault.line for fault in caught.value.faults} == {line}
+    assert f"\n  {place} (line {line}): " in str(caught.value)
+
+
+def test_every_entry_of_every_built_in_file_has_its_line() -> None:
+    """Whatever is written in a file is found in its own line."""
+    for name in pp.list_mechanisms():
+        mech = pp.load(name)
+        lines = mech.to_toml().splitlines()
+        for place, key in entries(mech.to_dict()):
+            line = line_of(mech.to_toml(), place)
+            assert line is not None
+            assert f"{key} =" in lines[line - 1] or lines[line - 1].startswith("[["), (name, place)
+
+
+def entries(table: dict, path: str = ""):
+    """Places and names of all entries of a file's tables."""
+    for key, value in table.items():
+        place = f"{path}{key}"
+        if isinstance(value, dict):
+            yield from entries(value, f"{place}.")
+        elif isinstance(value, list) and value and isinstance(value[0], dict):
+            for i, item in enumerate(value, 1):
+                yield from entries(item, f"{place}.{i}.")
+        else:
+            yield place, key
+
+
+def test_without_a_text_there_is_no_line() -> None:
+    content = pp.load(BUILT_IN).to_dict()
+    content["platform"]["mass"] = -1
+    with pytest.raises(MechanismError) as caught:
+        pp.Mechanism.from_dict(content)
+    (fault,) = caught.value.faults
+    assert fault.line is None
+    assert str(fault).startswith("platform.mass: is -1 kg")
+    assert str(Fault("a", "b", 3)) == "a (line 3): b"
