@@ -42,6 +42,7 @@ pub mod singularity;
 pub mod spatial;
 pub mod spec;
 pub mod status;
+mod streaming;
 mod svd;
 pub mod threads;
 pub mod trig;
