@@ -6,6 +6,7 @@
 pub mod assembly;
 pub mod base_parameters;
 pub mod batch;
+mod called;
 pub mod chart;
 pub mod clearance;
 pub mod complex;
