@@ -39,7 +39,7 @@ test: test-rust tools $(BUILT) ## Rust and Python tests, without the slow ones
 	$(BIN)/python -m pytest -n auto
 
 test-all: tools $(BUILT) ## all tests, the slow ones too
-	cargo test $(LOCKED) -p polypod-core -- --include-ignored
+	cargo test $(LOCKED) --release -p polypod-core -- --include-ignored
 	$(BIN)/python -m pytest -m "" -n auto
 
 tools: ## what some tests use beside Python and Rust; on Debian, as root, it is installed
@@ -50,7 +50,7 @@ tools: ## what some tests use beside Python and Rust; on Debian, as root, it is 
 	else echo "tests that need them are left out; to have them: sudo apt-get install $(DEBIAN)"; fi
 
 test-rust:
-	cargo test $(LOCKED) -p polypod-core
+	cargo test $(LOCKED) --release -p polypod-core
 
 lint: $(BUILT) ## formatting, style and types of both languages
 	$(BIN)/ruff check

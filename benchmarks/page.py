@@ -7,6 +7,8 @@ import matplotlib.pyplot as plt
 from polypod.style import DASHES, GREY, INK, PALETTE, house_style
 
 COMPARED = 100_000
+CACHED = 1000
+"""States whose arrays stay in the core's own cache."""
 NAMES = {
     "inverse_dynamics": "inverse dynamics",
     "inverse_dynamics_from_coordinates": "inverse dynamics from coordinates",
@@ -93,18 +95,12 @@ def comparison_table(results):
 
 
 def operations_table(results):
-    fused, separate = (results["flops"][f"{kind}_flops_per_second"] for kind in ("fused", "separate"))
-    peak, counts = max(fused, separate), results["flops"]["per_state"]
-    moved = results["bandwidth"]["bytes_per_second"]
     found = {(row["operation"], row["threads"], row["states"]): row for row in results["curves"]}
     rows = []
     for name, title in NAMES.items():
         single, one, two = (found.get((name, *key)) for key in ((1, 1), (1, COMPARED), (2, COMPARED)))
         if one is None:
             continue
-        flops = counts.get(name, {}).get("flops")
-        # A Newton step is no state: its flops say nothing about the time of an iteration of several.
-        known = flops is not None and name != "forward_kinematics"
         rows.append(
             (
                 title,
@@ -113,20 +109,46 @@ def operations_table(results):
                 spread(one),
                 time(two["median"]) if two else "",
                 digits(one["median"] / two["median"], 2) if two else "",
-                f"{flops:,}" if flops else "",
-                f"{1e9 * flops / one['median'] / peak:.1%}" if known else "",
-                f"{one['bytes']:,.0f}",
-                time(1e9 * one["bytes"] / moved),
             )
         )
+    return table(("", "one state", f"of {COMPARED:,}", "quartiles", "two threads", "faster"), rows)
+
+
+def floors_table(results):
+    """Beside the times what arithmetic, divisions and memory would take alone."""
+    flops = results["flops"]
+    fused, separate, divisions, roots = (
+        flops[f"{kind}_per_second"] for kind in ("fused_flops", "separate_flops", "divisions", "roots")
+    )
+    peak, moved = max(fused, separate), results["bandwidth"]["bytes_per_second"]
+    found = {(row["operation"], row["threads"], row["states"]): row for row in results["curves"]}
+    rows = []
+    for name, title in NAMES.items():
+        many, cached = (found.get((name, 1, states)) for states in (COMPARED, CACHED))
+        if many is None:
+            continue
+        counted, arithmetic = flops["per_state"].get(name), ("",) * 5
+        # A Newton step is no state: its flops say nothing about the time of an iteration of several.
+        if counted is not None and name != "forward_kinematics":
+            slow = counted["div"] / divisions + counted["sqrt"] / roots
+            arithmetic = (
+                f"{counted['flops']:,}",
+                time(1e9 * counted["flops"] / peak),
+                f"{1e9 * counted['flops'] / many['median'] / peak:.0%}",
+                f"{counted['div']} and {counted['sqrt']}",
+                time(1e9 * slow),
+            )
+        copied = f"{many['bytes']:,.0f}", time(1e9 * many["bytes"] / moved)
+        rows.append((title, time(many["median"]), time(cached["median"]), *arithmetic, *copied))
     head = (
-        *("", "one state", f"of {COMPARED:,}", "quartiles", "two threads", "faster"),
-        *("flops", "of the peak", "bytes", "to copy them"),
+        *("", f"of {COMPARED:,}", f"of {CACHED:,}", "flops", "at the peak", "share"),
+        *("divisions, roots", "alone", "bytes", "to copy them"),
     )
     peaks = (
         f"Peak of the core: {digits(fused / 1e9)} Gflop/s with fused multiplications and additions, "
-        f"{digits(separate / 1e9)} Gflop/s with separate ones. It copies {digits(moved / 1e9)} GB/s, "
-        "read and written.\n\n"
+        f"{digits(separate / 1e9)} with separate ones, {digits(divisions / 1e9)} with divisions, "
+        f"{digits(roots / 1e9)} with square roots. It copies {digits(moved / 1e9)} GB/s, read and "
+        "written.\n\n"
     )
     return table(head, rows) + peaks
 
@@ -179,6 +201,7 @@ TABLES = {
     "machine": machine_table,
     "comparison": comparison_table,
     "operations": operations_table,
+    "floors": floors_table,
     "instruction sets": instruction_sets_table,
     "rust": rust_table,
     "memory": memory_table,

@@ -133,6 +133,19 @@ def test_threads_change_no_bit(name):
 
 
 @pytest.mark.parametrize("name", NAMES)
+def test_arrays_that_leave_the_caches_have_the_same_bits(name):
+    mech, count = load(name), 90_003
+    pose, twist, acceleration, *_ = inputs(mech, 1000)
+    few = named(mech.kinematics(pose, twist, acceleration)), named(mech.inverse_kinematics(pose))
+    pose, twist, acceleration = (np.resize(a, (count, *a.shape[1:])) for a in (pose, twist, acceleration))
+    for threads in (1, 2):
+        compute.set_threads(threads)
+        many = named(mech.kinematics(pose, twist, acceleration)), named(mech.inverse_kinematics(pose))
+        for expected, found in zip(few, many, strict=True):
+            assert_same(dict(found), {k: np.resize(a, (count, *a.shape[1:])) for k, a in expected})
+
+
+@pytest.mark.parametrize("name", NAMES)
 def test_threads_change_no_bit_of_what_goes_state_by_state(name):
     mech = load(name)
     pose, twist, *_ = inputs(mech, 100)

@@ -1,8 +1,8 @@
 //! What the arithmetic of one state is, and how fast the processor is at it: the counts of each operation for the
-//! published manipulator and the peak rate of multiplications and additions, as JSON.
+//! published manipulator and the peak rates of multiplications and additions, of divisions and of square roots, as JSON.
 //!
 //! The kernels run with a number that counts. Comparisons, selections, signs and memory are free; a division and a
-//! square root count as one each, though they take longer. Checks of the input are not in it.
+//! square root count as one flop each, though they take longer. Checks of the input are not in it.
 
 #[path = "../tests/common/mod.rs"]
 mod common;
@@ -155,51 +155,59 @@ fn every_link(mech: &Mechanism, platform: &Motion<Counted>) {
 
 /// As many chains as hide the time that one operation takes.
 const CHAINS: usize = 12;
-const ROUNDS: usize = 100_000;
+const ROUNDS: usize = 50_000;
 /// Short ones, of which the fastest counts: a peak is what nothing else has slowed down.
-const RUNS: usize = 200;
+const RUNS: usize = 50;
 
-/// Multiplications and additions by turns, in registers only: fused where the registers do that, and separate.
-struct Peak<'a>(&'a mut [f64; 2]);
+/// Operations a second in registers only: fused multiplications and additions (where the registers fuse them), separate ones,
+/// divisions, square roots.
+type Rates = [f64; 4];
+
+struct Peak<'a>(&'a mut Rates);
 
 impl Task for Peak<'_> {
     #[inline(always)]
     fn run<V: Lanes>(self) {
         let (a, b) = (V::lit(black_box(0.999)), V::lit(black_box(1e-3)));
-        let rate = |start: Instant| (2 * CHAINS * ROUNDS * V::WIDTH) as f64 / start.elapsed().as_secs_f64();
-        let mut chains = [V::lit(black_box(1.0)); CHAINS];
-        let start = Instant::now();
-        for _ in 0..ROUNDS {
-            for x in &mut chains {
-                *x = x.mul_add(a, b);
-            }
+        macro_rules! rate {
+            ($flops:literal, $x:ident => $next:expr) => {{
+                let mut chains = [V::lit(black_box(1.0)); CHAINS];
+                let start = Instant::now();
+                for _ in 0..ROUNDS {
+                    for $x in &mut chains {
+                        *$x = $next;
+                    }
+                }
+                black_box(chains);
+                ($flops * CHAINS * ROUNDS * V::WIDTH) as f64 / start.elapsed().as_secs_f64()
+            }};
         }
-        black_box(chains);
-        self.0[0] = rate(start);
-        let start = Instant::now();
-        for _ in 0..ROUNDS {
-            for x in &mut chains {
-                *x = *x * a + b;
-            }
-        }
-        black_box(chains);
-        self.0[1] = rate(start);
+        *self.0 = [
+            rate!(2, x => x.mul_add(a, b)),
+            rate!(2, x => *x * a + b),
+            rate!(1, x => a / *x),
+            rate!(1, x => x.sqrt()),
+        ];
     }
 }
 
 fn main() {
     let mech = common::published();
     let state = common::states(&mech, 1, 1)[0];
-    let mut peaks = [0.0_f64; 2];
+    let mut peaks = Rates::default();
     for _ in 0..RUNS {
-        let mut now = [0.0; 2];
+        let mut now = Rates::default();
         dispatch(Peak(&mut now));
-        peaks = [peaks[0].max(now[0]), peaks[1].max(now[1])];
+        for k in 0..peaks.len() {
+            peaks[k] = peaks[k].max(now[k]);
+        }
     }
     let result = json!({
         "per_state": counts(&mech, &state),
         "fused_flops_per_second": peaks[0],
         "separate_flops_per_second": peaks[1],
+        "divisions_per_second": peaks[2],
+        "roots_per_second": peaks[3],
     });
     println!("{result}");
 }

@@ -4,6 +4,7 @@
 //! twist and acceleration exactly. Coordinates that a constraint makes dependent are solved first. This is the one
 //! place with trigonometry.
 
+use crate::called::Called;
 use crate::constraint;
 use crate::lanes::{Lanes, Work, any};
 use crate::linear::{solve, solve_all};
@@ -536,30 +537,27 @@ impl<V: Lanes> Work<V> for Varying<'_, V> {
 
     #[inline(always)]
     fn run(self) -> Variation<V> {
-        let mut q = [Jet::zero(); MAX_COORDINATES];
+        let mut q = [Called::zero(); MAX_COORDINATES];
         for k in 0..MAX_COORDINATES {
             let (Jet { x, d, dd }, zero) = (self.q[k], V::zero());
-            q[k] = Jet::new(Dual::new(x, zero), Dual::new(d, zero), Dual::new(dd, zero));
+            q[k] = Called(Jet::new(Dual::new(x, zero), Dual::new(d, zero), Dual::new(dd, zero)));
         }
         if let Some(k) = self.number {
-            q[k].x.d = V::one();
+            q[k].0.x.d = V::one();
         }
         let pose = self.set.pose(self.mech, &q);
         let (values, mut all) = (residual(self.mech, &pose), Variation::none());
         let [x, y, z] = pose.rotation.0;
         let vectors = [x, y, z, pose.o];
         for k in 0..4 {
-            let parts = parts(vectors[k]);
-            for order in 0..3 {
-                let Vec3 { x, y, z } = parts[order];
-                all.pose[order][k] = Vec3 { x: x.d, y: y.d, z: z.d };
-            }
+            let Vec3 { x: Called(x), y: Called(y), z: Called(z) } = vectors[k];
+            all.pose[0][k] = Vec3::new(x.x.d, y.x.d, z.x.d);
+            all.pose[1][k] = Vec3::new(x.d.d, y.d.d, z.d.d);
+            all.pose[2][k] = Vec3::new(x.dd.d, y.dd.d, z.dd.d);
         }
         for k in 0..MAX_CONSTRAINTS {
-            let Jet { x, d, dd } = values[k];
-            for (order, part) in [x, d, dd].into_iter().enumerate() {
-                all.constraints[order][k] = part.d;
-            }
+            let Called(Jet { x, d, dd }) = values[k];
+            (all.constraints[0][k], all.constraints[1][k], all.constraints[2][k]) = (x.d, d.d, dd.d);
         }
         all
     }

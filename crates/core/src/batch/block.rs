@@ -11,6 +11,7 @@ use rayon::prelude::*;
 use super::{Field, FieldId, Table};
 use crate::lanes::{self, Lanes, Line, Task, WIDTH};
 use crate::status::Status;
+use crate::streaming;
 use crate::threads;
 
 /// So many states at least are worth a thread of their own.
@@ -18,6 +19,9 @@ const GRAIN: usize = 2048;
 
 /// Parts for each thread, so that one that is held up does not hold up all.
 const PARTS: usize = 4;
+
+/// A table of so many numbers, eight megabytes, is written past the caches.
+const STREAMED: usize = 1 << 20;
 
 /// What is done with states side by side. `N` arrays are answered.
 pub(super) trait Operation<const N: usize>: Sync {
@@ -398,6 +402,8 @@ impl<O: Working<N>, const N: usize> Task for Blocks<'_, O, N> {
             count - width
         });
         let (mut rows, mut room) = (vec![Line([0.0; WIDTH]); count], operation.room::<V>());
+        let streamed = if part.states * count < STREAMED { 0 } else { count * WIDTH };
+        let mut staged = vec![MaybeUninit::uninit(); streamed];
         for block in 0..part.status.len().div_ceil(WIDTH) {
             let first = block * WIDTH;
             let status = &mut part.status[first..];
@@ -415,17 +421,29 @@ impl<O: Working<N>, const N: usize> Task for Blocks<'_, O, N> {
             for k in 0..N {
                 let (width, start) = (part.widths[k], starts[k]);
                 let places = &mut part.data[k][first * width..];
-                copy::<V>(&rows[start..start + width], &answered[..held], places);
+                copy::<V>(&rows[start..start + width], &answered[..held], &mut staged, places);
             }
         }
+        streaming::finish();
     }
 }
 
-/// From rows, states side by side, to states one after the other; NaN for those without an answer.
+/// From rows, states side by side, to states one after the other; NaN for those without an answer. Past the caches if there
+/// is room to put them together first.
 #[inline(always)]
-fn copy<V: Lanes>(rows: &[Line], answered: &[bool], to: &mut [MaybeUninit<f64>]) {
+fn copy<V: Lanes>(
+    rows: &[Line],
+    answered: &[bool],
+    staged: &mut [MaybeUninit<f64>],
+    to: &mut [MaybeUninit<f64>],
+) {
     if *answered == [true; WIDTH] {
-        return V::scatter(rows, to);
+        let numbers = rows.len() * WIDTH;
+        if staged.is_empty() || !streaming::begins_line(to) {
+            return V::scatter(rows, to);
+        }
+        V::scatter(rows, staged);
+        return streaming::copy(&staged[..numbers], &mut to[..numbers]);
     }
     for (lane, (answered, places)) in answered.iter().zip(to.chunks_exact_mut(rows.len().max(1))).enumerate()
     {

@@ -1,0 +1,56 @@
+//! Writing past the caches. An array that is too long to stay in them would be read before it is written, line by line, only
+//! to be put out again: half of what the memory has to move.
+
+use std::mem::MaybeUninit;
+
+/// Bytes of a line of the caches.
+const LINE: usize = 64;
+
+/// Whether a line begins there: half a line is not written past the caches at once.
+#[inline(always)]
+pub(crate) fn begins_line(places: &[MaybeUninit<f64>]) -> bool {
+    places.as_ptr().addr().is_multiple_of(LINE)
+}
+
+/// Copies whole lines to a place where a line begins; [`finish`] lets other threads see them.
+///
+/// # Panics
+/// If they are no whole lines, are not as many as there is room for, or no line begins there.
+#[inline(always)]
+pub(crate) fn copy(numbers: &[MaybeUninit<f64>], places: &mut [MaybeUninit<f64>]) {
+    assert!(
+        numbers.len() == places.len() && size_of_val(numbers).is_multiple_of(LINE) && begins_line(places)
+    );
+    #[cfg(target_arch = "x86_64")]
+    x86::copy(numbers, places);
+    #[cfg(not(target_arch = "x86_64"))]
+    places.copy_from_slice(numbers);
+}
+
+/// Lets other threads see what was copied.
+#[inline(always)]
+pub(crate) fn finish() {
+    #[cfg(target_arch = "x86_64")]
+    x86::finish();
+}
+
+#[cfg(target_arch = "x86_64")]
+mod x86 {
+    use std::arch::x86_64::{__m128i, _mm_loadu_si128, _mm_sfence, _mm_stream_si128};
+    use std::mem::MaybeUninit;
+
+    #[inline(always)]
+    pub(super) fn copy(numbers: &[MaybeUninit<f64>], places: &mut [MaybeUninit<f64>]) {
+        let (from, to) = (numbers.as_ptr().cast::<__m128i>(), places.as_mut_ptr().cast::<__m128i>());
+        for k in 0..numbers.len() / 2 {
+            // SAFETY: both have so many numbers, `to` begins a line, and every processor of this kind has the instructions.
+            unsafe { _mm_stream_si128(to.add(k), _mm_loadu_si128(from.add(k))) };
+        }
+    }
+
+    #[inline(always)]
+    pub(super) fn finish() {
+        // SAFETY: every processor of this kind has the instruction.
+        unsafe { _mm_sfence() };
+    }
+}
