@@ -23,7 +23,7 @@ LOCKED := $(if $(CI),--locked)
 DEPS := $(VENV)/.deps
 BUILT := $(VENV)/.built
 # Whatever the compiled module is made from; Python sources are used in place and need no build.
-RUST := Cargo.toml $(wildcard Cargo.lock) $(shell find crates -name target -prune -o -type f \( -name '*.rs' -o -name 'Cargo.toml' \) -print 2>/dev/null)
+RUST := Cargo.toml $(wildcard Cargo.lock) $(shell find crates/core crates/py -name target -prune -o -type f \( -name '*.rs' -o -name 'Cargo.toml' \) -print 2>/dev/null)
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
@@ -35,11 +35,11 @@ help: ## list the targets
 demo: $(BUILT) ## analyse the published manipulator: tables and figures into demo/
 	$(BIN)/polypod demo -o demo
 
-test: test-rust tools $(BUILT) ## Rust and Python tests, without the slow ones
+test: $(BUILT) test-rust tools ## Rust and Python tests, without the slow ones
 	$(BIN)/python -m pytest -n auto
 
 test-all: tools $(BUILT) ## all tests, the slow ones too
-	cargo test $(LOCKED) --release -p polypod-core -- --include-ignored
+	cargo test $(LOCKED) --release -- --include-ignored
 	$(BIN)/python -m pytest -m "" -n auto
 
 tools: ## what some tests use beside Python and Rust; on Debian, as root, it is installed
@@ -49,8 +49,8 @@ tools: ## what some tests use beside Python and Rust; on Debian, as root, it is 
 	elif [ "$$(id -u)" = 0 ]; then apt-get update -qq && apt-get install -qq -y --no-install-recommends $(DEBIAN) >/dev/null; \
 	else echo "tests that need them are left out; to have them: sudo apt-get install $(DEBIAN)"; fi
 
-test-rust:
-	cargo test $(LOCKED) --release -p polypod-core
+test-rust: $(BUILT)
+	cargo test $(LOCKED) --release
 
 lint: $(BUILT) ## formatting, style and types of both languages
 	$(BIN)/ruff check

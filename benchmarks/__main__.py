@@ -69,7 +69,7 @@ def workspaces(threads):
 def cargo(*command, then=()):
     """What a cargo command prints that first builds on all cores, then runs on one."""
     build = ["cargo", "bench", "--no-run"] if command[0] == "bench" else ["cargo", "build"]
-    target = ["--package", "polypod-core", *command[1:]]
+    target = ["--package", "polypod-bench", *command[1:]]
     subprocess.run([*build, *target], cwd=ROOT, check=True)
     run = ["cargo", command[0], *target, "--", *then]
     done = subprocess.run(
@@ -150,7 +150,7 @@ def measure():
     say("Rust")
     results["rust"] = rust()
     results["bandwidth"] = child("bandwidth")
-    results["flops"] = json.loads(cargo("run", "--release", "--example", "flops"))
+    results["flops"] = json.loads(cargo("run", "--release"))
     return results
 
 

@@ -4,7 +4,7 @@
 //! The kernels run with a number that counts. Comparisons, selections, signs and memory are free; a division and a
 //! square root count as one flop each, though they take longer. Checks of the input are not in it.
 
-#[path = "../tests/common/mod.rs"]
+#[path = "../../core/tests/common/mod.rs"]
 mod common;
 
 use std::cell::Cell;

@@ -1,6 +1,6 @@
 //! Scalar cost of the kernels for one state of the published manipulator.
 
-#[path = "../tests/common/mod.rs"]
+#[path = "../../core/tests/common/mod.rs"]
 mod common;
 
 use std::hint::black_box;
