@@ -75,10 +75,12 @@ impl Start {
     /// Adds a solution for the generic lengths, if it is a new one.
     fn extend(&mut self, mech: &Mechanism, pose: Pose<C>) {
         if self.poses.is_empty() {
-            // The reflection is one only if it maps solutions to solutions: axes must agree with it too.
+            // The reflection is one only if it maps solutions to solutions: axes must agree with it too. And to others: a
+            // planar mechanism stays in the plane.
             self.mirror = self.mirror.filter(|m| {
-                let mirrored = system(mech, &m.apply(&pose), &self.squares).residual;
-                mirrored.iter().all(|f| f.norm() < SAME)
+                let mirrored = m.apply(&pose);
+                let residual = system(mech, &mirrored, &self.squares).residual;
+                residual.iter().all(|f| f.norm() < SAME) && distance(mech, &mirrored, &pose) > SAME
             });
         }
         let mirrored = self.mirror.map(|m| m.apply(&pose));
