@@ -36,15 +36,15 @@ pub(crate) fn finish() {
 
 #[cfg(target_arch = "x86_64")]
 mod x86 {
-    use std::arch::x86_64::{__m128i, _mm_loadu_si128, _mm_sfence, _mm_stream_si128};
+    use std::arch::x86_64::{_mm_loadu_pd, _mm_sfence, _mm_stream_pd};
     use std::mem::MaybeUninit;
 
     #[inline(always)]
     pub(super) fn copy(numbers: &[MaybeUninit<f64>], places: &mut [MaybeUninit<f64>]) {
-        let (from, to) = (numbers.as_ptr().cast::<__m128i>(), places.as_mut_ptr().cast::<__m128i>());
-        for k in 0..numbers.len() / 2 {
-            // SAFETY: both have so many numbers, `to` begins a line, and every processor of this kind has the instructions.
-            unsafe { _mm_stream_si128(to.add(k), _mm_loadu_si128(from.add(k))) };
+        let (from, to) = (numbers.as_ptr().cast::<f64>(), places.as_mut_ptr().cast::<f64>());
+        for k in (0..numbers.len()).step_by(2) {
+            // SAFETY: both have so many numbers, all written, `to` begins a line, and every processor of this kind has the instructions.
+            unsafe { _mm_stream_pd(to.add(k), _mm_loadu_pd(from.add(k))) };
         }
     }
 
