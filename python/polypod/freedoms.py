@@ -74,7 +74,7 @@ def _line(axis: Array, pitch: float, point: Array) -> dict[str, Any]:
 def constraint_wrenches(mech: Mechanism) -> list[dict[str, Any]]:
     """The constraints' wrenches at the centre pose, at o in base axes: those that depend on others, too.
 
-    A unit force with its moment, in N m by N, and its line; or a unit couple. One that vanishes there has no axis.
+    A unit force with its moment, in N m by N, and its line; or a unit couple. One that vanishes has no axis.
     """
     mobility, found = mech.mobility(), mech.constraint_screws(mech.home)
     return [

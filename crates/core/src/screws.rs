@@ -8,8 +8,9 @@ use crate::singularity::{Screw, screw};
 use crate::spatial::{Pose, Twist, Vec3, Wrench};
 use crate::svd::Svd;
 
-/// What is less, in pure numbers, is nothing: a singular value of constraints, a turn, a difference of pitches.
-const NOTHING: f64 = 1e-9;
+/// What is less, in pure numbers, is nothing: a singular value of constraints, a turn, a difference of pitches. Poses may miss
+/// their constraints by as much.
+const NOTHING: f64 = 1e-6;
 
 /// The principal screws of the twists that the constraints leave at a pose, translations first: unit translations, and
 /// turns by one radian about axes at right angles, with the slides that go with them. Among screws of one pitch the axes are
@@ -18,7 +19,7 @@ const NOTHING: f64 = 1e-9;
 pub fn freedoms(mech: &Mechanism, pose: &Pose<f64>) -> Option<Vec<(Twist<f64>, Screw)>> {
     let scale = mech.characteristic_length;
     // Twists (v, Λω) that no constraint feels.
-    let rows = mech.independent.iter().map(|c| {
+    let rows = mech.constraints.iter().map(|c| {
         let Wrench { force, torque } = constraint::row(c, pose);
         let unit = 1.0 / constraint::row_unit(&Wrench::new(force, torque), scale);
         Wrench::new(force * unit, torque * (unit / scale)).array()
