@@ -162,10 +162,7 @@ def test_forward_kinematics_returns_to_the_pose(name: str) -> None:
     assert apart(mech, found.pose, pose).max() < POSE
 
 
-TWICE = pytest.mark.xfail(strict=True, reason="the modes of planar mechanisms are found twice each")
-
-
-@pytest.mark.parametrize("name", [pytest.param(n, marks=TWICE) if n == "3-rpr" else n for n in REGULAR])
+@pytest.mark.parametrize("name", REGULAR)
 def test_the_pose_is_among_the_assembly_modes(name: str) -> None:
     mech = load(name)
     pose = sampled(name)[0][0]
