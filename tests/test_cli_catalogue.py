@@ -128,8 +128,16 @@ def test_freedoms_of_a_3_rps_at_rest(run):
     wrenches = facts_of(run, "3-rps")["constraint_wrenches"]
     mech = pp.load("3-rps")
     for row, leg in zip(wrenches, mech.to_dict()["legs"], strict=True):
-        joint = mech.home[:3, :3] @ leg["platform"]["point"] / 1e3 + mech.home[:3, 3]
+        joint = mech.home[:3, :3] @ np.array(leg["platform"]["point"]) / 1e3 + mech.home[:3, 3]
         assert np.linalg.norm(np.cross(joint - row["point"], row["axis"])) < 1e-12
+
+
+def test_a_ball_below_lets_turn_about_itself(run):
+    """The SPR leg's ball 560 mm below o: with translations along Y and Z, turns about axes through it."""
+    screws = facts_of(run, "4sps-spr")["freedoms"]["screws"]
+    assert [row["kind"] for row in screws] == ["translation"] * 2 + ["turn"] * 3
+    for row in screws[2:]:
+        assert np.linalg.norm(np.cross(row["point"], row["axis"])) < 1e-12
 
 
 def test_a_loose_pose_has_more_freedoms(run):

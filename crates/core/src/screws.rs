@@ -13,7 +13,8 @@ use crate::svd::Svd;
 const NOTHING: f64 = 1e-6;
 
 /// The principal screws of the twists that the constraints leave at a pose, translations first: unit translations, and
-/// turns by one radian about axes at right angles, with the slides that go with them. Among screws of one pitch the axes are
+/// turns by one radian about axes at right angles, with the slides that go with them where no translation can take them away.
+/// Among screws of one pitch the axes are
 /// those nearest to the base's. None where a leg has no direction.
 #[must_use]
 pub fn freedoms(mech: &Mechanism, pose: &Pose<f64>) -> Option<Vec<(Twist<f64>, Screw)>> {
@@ -49,13 +50,47 @@ pub fn freedoms(mech: &Mechanism, pose: &Pose<f64>) -> Option<Vec<(Twist<f64>, S
         }
     }
     let mut found = nearest_to_base(&slides, |twist| twist.v);
-    let mut by_pitch = diagonal(&screws, |a, b| 0.5 * (a.omega.dot(b.v) + b.omega.dot(a.v)));
+    let mut by_pitch = diagonal(&simplest(&screws, &found)?, pitch_form);
     while let Some((pitch, _)) = by_pitch.first().copied() {
         let alike = by_pitch.iter().take_while(|(h, _)| h - pitch <= NOTHING * scale).count();
         let group: Vec<Twist<f64>> = by_pitch.drain(..alike).map(|(_, twist)| twist).collect();
         found.extend(nearest_to_base(&group, |twist| twist.omega));
     }
     Some(found.into_iter().map(|twist| (twist, screw(pose.o, &twist, scale))).collect())
+}
+
+/// ½ (ω_1·v_2 + ω_2·v_1), the pitch of a twist with itself.
+fn pitch_form(a: &Twist<f64>, b: &Twist<f64>) -> f64 {
+    0.5 * (a.omega.dot(b.v) + b.omega.dot(a.v))
+}
+
+/// The turns with such translations added that as many pitches as can be are zero; what cannot stays.
+fn simplest(turns: &[Twist<f64>], slides: &[Twist<f64>]) -> Option<Vec<Twist<f64>>> {
+    let (n, t) = (turns.len(), slides.len());
+    if n == 0 || t == 0 {
+        return Some(turns.to_vec());
+    }
+    // Turn i gets the share (i, s) of slide s: the least shares that leave the least of the form.
+    let pairs: Vec<(usize, usize)> = (0..n).flat_map(|i| (i..n).map(move |j| (i, j))).collect();
+    let matrix = DMatrix::from_fn(pairs.len(), n * t, |row, column| {
+        let ((i, j), (of, slide)) = (pairs[row], (column / t, slides[column % t].v));
+        let part = |k: usize, other: usize| if k == of { 0.5 * turns[other].omega.dot(slide) } else { 0.0 };
+        part(i, j) + part(j, i)
+    });
+    let left = |row: usize| -pitch_form(&turns[pairs[row].0], &turns[pairs[row].1]);
+    let svd = Svd::of(&matrix)?;
+    let mut shares = vec![0.0; n * t];
+    for k in (0..n * t).filter(|&k| svd.values[k] > NOTHING) {
+        let along: f64 = (0..pairs.len()).map(|row| svd.u[(row, k)] * left(row)).sum();
+        for (column, share) in shares.iter_mut().enumerate() {
+            *share += svd.v_t[(k, column)] * along / svd.values[k];
+        }
+    }
+    let moved = |i: usize| {
+        let slide = sum(slides, |s| shares[i * t + s]);
+        Twist::new(turns[i].v + slide.v, turns[i].omega)
+    };
+    Some((0..n).map(moved).collect())
 }
 
 /// The wrench of every constraint of every leg at a pose, of a unit force or else of a unit couple, with its line: axis, pitch
@@ -142,7 +177,7 @@ mod tests {
                         assert!((at_o - a.v).norm() <= 1e-9 * (1.0 + a.v.norm()));
                     }
                     for (b, other) in &found[..i] {
-                        assert_eq!(slides && !other.pitch.is_infinite(), false);
+                        assert!(!slides || other.pitch.is_infinite());
                         if slides == other.pitch.is_infinite() {
                             assert!(line.axis.dot(other.axis).abs() <= 1e-8);
                         }
@@ -166,6 +201,30 @@ mod tests {
         }
     }
 
+    /// A translation along x makes every parallel of a turn about y a freedom: a screw about it becomes a turn, and axes that
+    /// cross it are brought through one point.
+    #[test]
+    fn translations_take_away_the_slides_that_they_can() {
+        let screw_of = |axis: Vec3<f64>, point: Vec3<f64>, pitch: f64| {
+            Twist::new(axis * pitch + point.cross(axis), axis)
+        };
+        let slides = [Twist::new(Vec3::Y, Vec3::zero()), Twist::new(Vec3::Z, Vec3::zero())];
+        let ball = Vec3::new(0.0, 0.0, 0.5);
+        let turns = [
+            screw_of(Vec3::X, Vec3::zero(), 0.0),
+            screw_of(Vec3::Y, ball, 0.3),
+            screw_of(Vec3::Z, Vec3::zero(), -0.2),
+        ];
+        for turn in simplest(&turns, &slides).expect("finite") {
+            let line = screw(Vec3::zero(), &turn, 1.0);
+            assert!(line.pitch.abs() <= 1e-14, "{}", line.pitch);
+            assert!(line.axis.cross(ball - line.point).norm() <= 1e-14);
+        }
+        // No translation along the axis: the pitch stays.
+        let kept = simplest(&[screw_of(Vec3::X, ball, 0.3)], &slides).expect("finite");
+        assert!((screw(Vec3::zero(), &kept[0], 1.0).pitch - 0.3).abs() <= 1e-14);
+    }
+
     /// Two turns about crossed axes: a cylindroid, its principal screws midway between them (Ball, A Treatise on the Theory of
     /// Screws, 1900, section 14).
     #[test]
@@ -179,7 +238,7 @@ mod tests {
         let (a, b) = (turn(1.0), turn(-1.0));
         // By a radian about axes at right angles.
         let pair = [sum(&[a, b], |_| 0.5 / half.cos()), sum(&[a, b], |i| (0.5 - i as f64) / half.sin())];
-        let found = diagonal(&pair, |a, b| 0.5 * (a.omega.dot(b.v) + b.omega.dot(a.v)));
+        let found = diagonal(&pair, pitch_form);
         let pitches = [-apart * half.tan(), apart / half.tan()];
         for ((pitch, twist), expected) in found.iter().zip(pitches) {
             assert!((pitch - expected).abs() <= 1e-14, "{pitch} {expected}");
