@@ -128,7 +128,8 @@ def test_freedoms_of_a_3_rps_at_rest(run):
     wrenches = facts_of(run, "3-rps")["constraint_wrenches"]
     mech = pp.load("3-rps")
     for row, leg in zip(wrenches, mech.to_dict()["legs"], strict=True):
-        joint = mech.home[:3, :3] @ np.array(leg["platform"]["point"]) / 1e3 + mech.home[:3, 3]
+        place, angle = leg["platform"]["point"], math.radians(leg["platform"]["point"]["angle"])
+        joint = mech.home[:3, 3] + place["radius"] / 1e3 * np.array([math.cos(angle), math.sin(angle), 0.0])
         assert np.linalg.norm(np.cross(joint - row["point"], row["axis"])) < 1e-12
 
 
