@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 
+import numpy as np
 import pytest
 
 import polypod as pp
@@ -113,6 +114,39 @@ def test_parasitic_motion_of_a_3_rps(run):
     assert "x +1.14 mm" in run("info", "3-rps")[1]
 
 
+def test_freedoms_of_a_3_rps_at_rest(run):
+    """It rises, and turns about any line in the plane of its upper joints."""
+    rise, *turns = facts_of(run, "3-rps")["freedoms"]["screws"]
+    assert rise["kind"] == "translation"
+    np.testing.assert_allclose(rise["axis"], [0, 0, 1], atol=1e-12)
+    np.testing.assert_allclose([row["axis"] for row in turns], [[1, 0, 0], [0, 1, 0]], atol=1e-12)
+    np.testing.assert_allclose([row["point"] for row in turns], [[0, 0, 0.5]] * 2, atol=1e-12)
+    assert [row["kind"] for row in turns] == ["turn", "turn"]
+    said = run("info", "3-rps")[1]
+    assert "0.0, 0.0, 500.0" in said
+    # Each constraint is a force through an upper joint, along the axis of its revolute joint.
+    wrenches = facts_of(run, "3-rps")["constraint_wrenches"]
+    mech = pp.load("3-rps")
+    for row, leg in zip(wrenches, mech.to_dict()["legs"], strict=True):
+        place, angle = leg["platform"]["point"], math.radians(leg["platform"]["point"]["angle"])
+        joint = mech.home[:3, 3] + place["radius"] / 1e3 * np.array([math.cos(angle), math.sin(angle), 0.0])
+        assert np.linalg.norm(np.cross(joint - row["point"], row["axis"])) < 1e-12
+
+
+def test_a_ball_below_lets_turn_about_itself(run):
+    """The SPR leg's ball 560 mm below o: with translations along Y and Z, turns about axes through it."""
+    screws = facts_of(run, "4sps-spr")["freedoms"]["screws"]
+    assert [row["kind"] for row in screws] == ["translation"] * 2 + ["turn"] * 3
+    for row in screws[2:]:
+        assert np.linalg.norm(np.cross(row["point"], row["axis"])) < 1e-12
+
+
+def test_a_loose_pose_has_more_freedoms(run):
+    """The centre of the 3-UPU with radial axes: three couples in a plane hold but two turns."""
+    assert [row["kind"] for row in facts_of(run, "3-upu")["freedoms"]["screws"]] == ["translation"] * 3
+    assert len(facts_of(run, "3-upu-snu")["freedoms"]["screws"]) > 3
+
+
 def test_translations_have_no_parasitic_motion(run):
     freedoms = facts_of(run, "3-upu")["freedoms"]
     assert freedoms["independent"] == ["x", "y", "z"]
@@ -121,7 +155,11 @@ def test_translations_have_no_parasitic_motion(run):
 
 def test_six_freedoms_have_nothing_that_follows(run):
     facts = facts_of(run, "tsai-6-sps")
-    assert facts["freedoms"] == {"independent": ["x", "y", "z", "rx", "ry", "rz"], "coupled": []}
+    assert facts["freedoms"]["independent"] == ["x", "y", "z", "rx", "ry", "rz"]
+    assert facts["freedoms"]["coupled"] == []
+    screws = facts["freedoms"]["screws"]
+    assert [row["kind"] for row in screws] == ["translation"] * 3 + ["turn"] * 3
+    np.testing.assert_allclose([row["axis"] for row in screws], [*np.eye(3), *np.eye(3)], atol=1e-12)
     assert facts["constraint_wrenches"] == []
 
 
@@ -151,10 +189,13 @@ def test_constraint_wrenches(run, name, wrenches):
         if moment is not None:
             sign = math.copysign(1.0, sum(a * b for a, b in zip(row["moment"], moment, strict=True)))
             assert row["moment"] == pytest.approx([sign * value for value in moment], abs=1e-12)
-    assert len(found) == 6 - pp.load(name).dof
+    assert sum(row["independent"] for row in found) == 6 - pp.load(name).dof
 
 
 def test_redundant_constraints_are_named(run):
+    wrenches = facts_of(run, "exechon")["constraint_wrenches"]
+    assert sum(not row["independent"] for row in wrenches) == 2
+    assert run("info", "exechon")[1].count("redundant") > 2
     words = " ".join(run("info", "exechon")[1].split())
     assert "2 redundant constraints couple legs 1 and 2:" in words
     words = " ".join(run("info", "2upr-rpu")[1].split())

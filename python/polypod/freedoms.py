@@ -6,9 +6,12 @@ import math
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from polypod.mechanism import Mechanism
 from polypod.status import Status
+
+Array = NDArray[np.float64]
 
 TURN = math.radians(10)
 SHIFT = 0.1
@@ -17,12 +20,9 @@ SHIFT = 0.1
 STILL = 1e-9
 """What changes less, in rad and in characteristic lengths, does not move."""
 
-COUPLE = 1e-9
-"""A wrench with less force, in 1/m by the characteristic length, is a couple."""
-
 
 def freedoms(mech: Mechanism) -> dict[str, Any]:
-    """Independent coordinates at the centre pose, and how the others follow each of them.
+    """Independent coordinates at the centre pose, how the others follow each of them, and screws.
 
     `coupled` has for each independent coordinate its `change`, and in `follow` the changes of the others
     that move with it: parasitic motions, also those of second order. `follow` is None where there is no pose.
@@ -41,30 +41,53 @@ def freedoms(mech: Mechanism) -> dict[str, Any]:
             changes = {n: float(state.coordinates[n] - home[n]) for n in names if n not in chosen}
             follow = {n: c for n, c in changes.items() if abs(c) > STILL * size[n]}
         coupled.append({"coordinate": moved, "change": float(change), "follow": follow})
-    return {"independent": list(chosen), "coupled": coupled}
+    return {"independent": list(chosen), "coupled": coupled, "screws": screws(mech)}
+
+
+def screws(mech: Mechanism) -> list[dict[str, Any]]:
+    """What the platform is free to do at the centre pose: principal screws of the base.
+
+    `kind` is translation, turn or screw; `pitch`, in m/rad, is None for a translation.
+    """
+    found = mech.freedom_screws(mech.home)
+    return [
+        {"kind": _kind(mech, pitch), **_line(axis, pitch, point)}
+        for axis, pitch, point in zip(found.axis, found.pitch, found.point, strict=True)
+    ]
+
+
+def _kind(mech: Mechanism, pitch: float) -> str:
+    if not math.isfinite(pitch):
+        return "translation"
+    return "turn" if abs(pitch) <= STILL * mech.characteristic_length else "screw"
+
+
+def _line(axis: Array, pitch: float, point: Array) -> dict[str, Any]:
+    finite = math.isfinite(pitch)
+    return {
+        "axis": axis.tolist() if np.isfinite(axis).all() else None,
+        "pitch": float(pitch) if finite else None,
+        "point": point.tolist() if finite else None,
+    }
 
 
 def constraint_wrenches(mech: Mechanism) -> list[dict[str, Any]]:
-    """The independent constraints' wrenches at the centre pose, at o in base axes.
+    """The constraints' wrenches at the centre pose, at o in base axes: those that depend on others, too.
 
-    A unit force with its moment, in N m by N; or a unit couple.
+    A unit force with its moment, in N m by N, and its line; or a unit couple. One that vanishes has no axis.
     """
-    mobility = mech.mobility()
-    rows = mech.jacobian(mech.home)[int(mech.actuated.sum()) :]
-    wrenches = []
-    for row, index in zip(rows, mobility.independent_rows, strict=True):
-        leg, kind = mobility.constraint_rows[index]
-        force, moment = row[:3], row[3:]
-        couple = bool(np.linalg.norm(force) * mech.characteristic_length <= COUPLE * np.linalg.norm(moment))
-        scale = float(np.linalg.norm(moment if couple else force))
-        known = scale > 0.0
-        wrenches.append(
-            {
-                "leg": leg,
-                "kind": kind,
-                "couple": couple,
-                "force": (force / scale).tolist() if known and not couple else [0.0] * 3,
-                "moment": (moment / scale).tolist() if known else [0.0] * 3,
-            }
+    mobility, found = mech.mobility(), mech.constraint_screws(mech.home)
+    return [
+        {
+            "leg": leg,
+            "kind": kind,
+            "independent": i in mobility.independent_rows,
+            "couple": not math.isfinite(pitch),
+            "force": vector[:3].tolist(),
+            "moment": vector[3:].tolist(),
+            **_line(axis, pitch, point),
+        }
+        for i, ((leg, kind), vector, axis, pitch, point) in enumerate(
+            zip(mobility.constraint_rows, found.vector, found.axis, found.pitch, found.point, strict=True)
         )
-    return wrenches
+    ]

@@ -54,6 +54,7 @@ from polypod.errors import (
 )
 from polypod.lines import line_of
 from polypod.schema import read_spec
+from polypod.screws import Screws, constraint_screws, freedom_screws
 from polypod.singularity import (
     NEAR_SINGULAR,
     TOLERANCE,
@@ -511,6 +512,38 @@ class Mechanism:
         (poses,) = POSE(pose)
         out = self._core.singularity(poses, self._length(length), float(tolerance))
         return Singularity(self, **out | {name: codes(out[name]) for name in ("kind", "leg", "uncontrolled")})
+
+    def freedom_screws(self, pose: ArrayLike) -> Screws:
+        """What the platform is free to do at a pose, as principal screws [T66].
+
+        Translations first, then turns with their slides, the least pitch first; axes at right angles, those
+        of the base where they can be. At a constraint singularity there are more than `dof`.
+
+        Args:
+            pose: (4, 4), one pose.
+
+        >>> import polypod as pp
+        >>> mech = pp.load("3-rps")
+        >>> free = mech.freedom_screws(mech.home)
+        >>> free.pitch.round(9) + 0.0, free.axis[0].round(9) + 0.0
+        (array([inf,  0.,  0.]), array([0., 0., 1.]))
+        """
+        return freedom_screws(self, pose)
+
+    def constraint_screws(self, pose: ArrayLike) -> Screws:
+        """The wrench of every constraint at a pose with its line [T66].
+
+        In the order of `mobility().constraint_rows`.
+
+        Args:
+            pose: (4, 4), one pose.
+
+        >>> import polypod as pp
+        >>> mech = pp.load("3-upu")
+        >>> mech.constraint_screws(mech.home).pitch  # couples: turns are held
+        array([inf, inf, inf])
+        """
+        return constraint_screws(self, pose)
 
     def singularity_distance(
         self,

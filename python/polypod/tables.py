@@ -40,6 +40,7 @@ def mechanism_tables(facts: Facts) -> list[Table]:
         topology_table(facts),
         constraints_table(facts),
         wrenches_table(facts),
+        screws_table(facts),
         coupled_table(facts),
         coordinates_table(facts),
         centre_table(facts),
@@ -119,19 +120,40 @@ def constraints_table(facts: Facts) -> Table:
 
 
 def wrenches_table(facts: Facts) -> Table:
-    """What the independent constraints can transmit at the centre pose."""
+    """What the constraints can transmit at the centre pose."""
     rows = [
         (
             row["leg"],
             row["kind"],
-            "couple" if row["couple"] else "force",
-            _vector(row["moment"] if row["couple"] else row["force"], 3),
-            "" if row["couple"] else _vector(row["moment"], 1, 1e3),
+            "nothing" if row["axis"] is None else "couple" if row["couple"] else "force",
+            _vector(row["axis"], 3) if row["axis"] else "",
+            _vector(row["point"], 1, 1e3) if row["point"] else "",
+            _pitch(row["pitch"]),
+            "" if row["independent"] else "redundant",
         )
         for row in facts["constraint_wrenches"]
     ]
-    headers = ("leg", "kind", "holds by a", "direction>", "moment of 1 N about o / N mm>")
+    headers = ("leg", "kind", "holds by a", "direction>", "through / mm>", "pitch / mm>", "")
     return Table("Constraint wrenches at the centre pose, base axes", headers, rows)
+
+
+def screws_table(facts: Facts) -> Table:
+    """What the platform is free to do at the centre pose."""
+    rows = [
+        (
+            row["kind"],
+            _vector(row["axis"], 3),
+            _vector(row["point"], 1, 1e3) if row["point"] else "",
+            _pitch(row["pitch"]),
+        )
+        for row in facts["freedoms"]["screws"]
+    ]
+    headers = ("freedom", "axis>", "through / mm>", "pitch / mm/rad>")
+    return Table("Freedoms at the centre pose: principal screws, base axes", headers, rows)
+
+
+def _pitch(value: float | None) -> str:
+    return "" if value is None else f"{1e3 * value:z.2f}"
 
 
 def coupled_table(facts: Facts) -> Table:

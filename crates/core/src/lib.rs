@@ -42,6 +42,7 @@ pub mod reach;
 pub mod reactions;
 pub mod real;
 pub mod roots;
+pub mod screws;
 mod self_stress;
 pub mod singularity;
 pub mod spatial;

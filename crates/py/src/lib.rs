@@ -22,7 +22,9 @@ use polypod_core::modes::{self, Start};
 use polypod_core::nearest::Search;
 use polypod_core::reactions;
 use polypod_core::roots::{self, Node, Precision};
-use polypod_core::singularity::Kind;
+use polypod_core::screws;
+use polypod_core::singularity::{Kind, Screw};
+use polypod_core::spatial::Pose;
 use polypod_core::spec::{Axes, Fault, Spec};
 use polypod_core::status::Status;
 use polypod_core::threads;
@@ -60,6 +62,18 @@ type JointRow = (String, &'static str, [String; 2]);
 type AllModes<'py> = (Bound<'py, PyDict>, Vec<usize>, Bound<'py, PyArray1<u8>>);
 
 type CoordinateSet = (&'static str, Vec<&'static str>, Option<Vec<bool>>);
+
+/// Vector, axis, pitch, point.
+type ScrewRow = ([f64; 6], [f64; 3], f64, [f64; 3]);
+
+fn screw_row(vector: [f64; 6], screw: &Screw) -> ScrewRow {
+    (vector, screw.axis.array(), screw.pitch, screw.point.array())
+}
+
+fn one_pose(poses: &Array<'_>) -> PyResult<Pose<f64>> {
+    let matrix = slice(poses)?;
+    if matrix.len() == 16 { Ok(batch::pose_of(matrix)) } else { Err(PyValueError::new_err("not one pose")) }
+}
 
 #[pyclass(name = "Mechanism", frozen)]
 struct PyMechanism(Mechanism, OnceLock<Option<Start>>);
@@ -262,6 +276,21 @@ impl PyMechanism {
         let poses = slice(&poses)?;
         let table = py.detach(|| batch::singularities(&self.0, poses, length, tolerance));
         arrays(py, table, &batch)
+    }
+
+    /// Vector (a twist at o), axis, pitch and point of each principal screw of the freedoms at one pose; none where a leg has no
+    /// direction.
+    fn freedom_screws(&self, poses: Array<'_>) -> PyResult<Option<Vec<ScrewRow>>> {
+        let pose = one_pose(&poses)?;
+        let found = screws::freedoms(&self.0, &pose);
+        Ok(found.map(|all| all.iter().map(|(twist, screw)| screw_row(twist.array(), screw)).collect()))
+    }
+
+    /// The same of the wrench of every constraint.
+    fn constraint_screws(&self, poses: Array<'_>) -> PyResult<Vec<ScrewRow>> {
+        let pose = one_pose(&poses)?;
+        let found = screws::constraints(&self.0, &pose);
+        Ok(found.iter().map(|(wrench, screw)| screw_row(wrench.array(), screw)).collect())
     }
 
     /// Names of the coordinates that are searched, and their arrays.
