@@ -4,7 +4,7 @@ use nalgebra::DMatrix;
 
 use crate::constraint;
 use crate::mechanism::Mechanism;
-use crate::singularity::{Screw, screw};
+use crate::singularity::{Screw, pure_row, screw};
 use crate::spatial::{Pose, Twist, Vec3, Wrench};
 use crate::svd::Svd;
 
@@ -14,16 +14,14 @@ const NOTHING: f64 = 1e-6;
 
 /// The principal screws of the twists that the constraints leave at a pose, translations first: unit translations, and
 /// turns by one radian about axes at right angles, with the slides that go with them where no translation can take them away.
-/// Among screws of one pitch the axes are
-/// those nearest to the base's. None where a leg has no direction.
+/// Among screws of one pitch the axes are those nearest to the base's. None where a leg has no direction.
 #[must_use]
 pub fn freedoms(mech: &Mechanism, pose: &Pose<f64>) -> Option<Vec<(Twist<f64>, Screw)>> {
     let scale = mech.characteristic_length;
     // Twists (v, Λω) that no constraint feels.
     let rows = mech.constraints.iter().map(|c| {
-        let Wrench { force, torque } = constraint::row(c, pose);
-        let unit = 1.0 / constraint::row_unit(&Wrench::new(force, torque), scale);
-        Wrench::new(force * unit, torque * (unit / scale)).array()
+        let row = constraint::row(c, pose);
+        pure_row(row * (1.0 / constraint::row_unit(&row, scale)), scale)
     });
     let rows: Vec<[f64; 6]> = rows.collect();
     let matrix = DMatrix::from_fn(rows.len().max(1), 6, |i, j| rows.get(i).map_or(0.0, |row| row[j]));

@@ -118,8 +118,9 @@ fn constraint_row<T: Real>(c: &Constraint, pose: &Pose<T>, scale: f64) -> [T; 6]
     pure_row(constraint::row(c, pose) * T::lit(constraint::length(c, scale)), scale)
 }
 
+/// A row for the twist (v, Λω), Λ being `scale`.
 #[inline(always)]
-fn pure_row<T: Real>(row: Wrench<T>, scale: f64) -> [T; 6] {
+pub(crate) fn pure_row<T: Real>(row: Wrench<T>, scale: f64) -> [T; 6] {
     Wrench::new(row.force, row.torque * T::lit(1.0 / scale)).array()
 }
 
