@@ -49,6 +49,8 @@ class Mechanism:
     @property
     def dof(self) -> int: ...
     @property
+    def rows(self) -> int: ...
+    @property
     def characteristic_length(self) -> float: ...
     @property
     def home(self) -> _Array: ...
@@ -88,6 +90,7 @@ class Mechanism:
         accelerations: _Array,
         wrenches: _Array | None,
         platform_axes: bool,
+        preferred: _Array | None = None,
     ) -> _Table: ...
     def forward_dynamics(
         self,

@@ -257,12 +257,16 @@ class InverseDynamics(Answer):
     """(..., n): active forces, N, positive when they push the platform away; zero for passive legs."""
     constraint: Array
     """(..., k): multipliers of the independent constraints, N, of kind D N m; for the paper's machine f_c."""
+    idle_torques: Array
+    """(..., idle freedoms): torques about their lines on the platform that the motion needs and no leg gives,
+    N m, such as a spindle's motor [T67]; in the order of `Mobility.idle`."""
     status: Codes
     """(...): `Status` of each state."""
 
     _variables: ClassVar = {
         "forces": "force",
         "constraint": "constraint",
+        "idle_torques": "idle_torque",
         "status": "status",
     }
 
@@ -571,6 +575,24 @@ class Published:
 
 
 @dataclass(frozen=True)
+class IdleFreedom:
+    """A turn of the platform that no leg feels at any pose, as the spin of a rod that all legs end on [T67]."""
+
+    body: str
+    """What the line is fixed in: "platform" or "base"."""
+    point: tuple[float, float, float]
+    """A point of the line in the axes of the body, m."""
+    axis: tuple[float, float, float]
+    """Its unit direction there: the spin is the angular velocity along it."""
+
+    def __str__(self) -> str:
+        point, axis = (f"({', '.join(f'{x:.6g}' for x in v)})" for v in (self.point, self.axis))
+        return (
+            f"spin about the line through {point} m along {axis}, {self.body} axes, felt by no leg"
+        )
+
+
+@dataclass(frozen=True)
 class Mobility:
     """Freedoms of the mechanism from ranks at generic poses, in the terms of Eq. 1 [T18]."""
 
@@ -595,7 +617,10 @@ class Mobility:
     passive_legs: tuple[str, ...]
     """The legs that spin freely about their own line."""
     uncontrolled: int
-    """Freedoms that remain at generic poses with all actuators locked: zero unless the design is singular."""
+    """Freedoms, idle ones apart, that remain at generic poses with all actuators locked: zero unless the design
+    is singular."""
+    idle: tuple[IdleFreedom, ...]
+    """Freedoms that no leg feels, by design [T67]."""
     constraint_rows: tuple[tuple[str, str], ...]
     """Leg and kind (A-E) of every scalar constraint."""
     independent_rows: tuple[int, ...]

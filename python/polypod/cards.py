@@ -75,6 +75,7 @@ def of_mobility(mobility: Mobility) -> str:
         notes.append(f"redundant constraints couple legs {', '.join(mobility.redundant_legs)}")
     if mobility.passive_legs:
         notes.append(f"legs {', '.join(mobility.passive_legs)} spin freely")
+    notes += [f"idle: {idle}" for idle in mobility.idle]
     if mobility.uncontrolled:
         notes.append(f"{mobility.uncontrolled} freedoms remain with all actuators locked, at every pose")
     return card("Mobility", f"{mobility.dof} freedoms", [rows_of(("", ""), rows)], notes=notes)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from polypod.answers import Kinematics
-from polypod.errors import PolypodError
+from polypod.errors import PolypodError, UnsupportedError
 from polypod.mechanism import Mechanism
 from polypod.motion import Motion
 
@@ -44,6 +44,13 @@ class ComputedTorque:
     """ζ: 1 for the fastest decay without overshoot."""
 
     def __post_init__(self) -> None:
+        why = None
+        if self.mech.redundantly_actuated:
+            why = "redundant legs that each follow a law of their own would contradict one another"
+        elif self.mech.mobility().idle:
+            why = "no leg gives the torque about the line of an idle freedom, which the law would ask for"
+        if why is not None:
+            raise UnsupportedError(f"{self.mech.name}: no computed torque in leg lengths: {why}")
         for name in ("frequency", "damping"):
             if not 0.0 < getattr(self, name) < np.inf:
                 raise PolypodError(f"{name} is {getattr(self, name)!r}; must be a positive number")
@@ -78,7 +85,7 @@ class ComputedTorque:
         """
         mech, (wanted, sample) = self.mech, self._desired(time)
         lengths, rates = mech.inverse_kinematics(pose).lengths, np.zeros(mech.n_legs)
-        rates[mech.actuated] = mech.jacobian(pose)[: mech.dof] @ twist
+        rates[mech.actuated] = mech.jacobian(pose)[: int(mech.actuated.sum())] @ twist
         # [T55] ℓ'' = ℓ_d'' + 2ζω (ℓ_d' - ℓ') + ω² (ℓ_d - ℓ); those of passive legs are not read
         accelerations = (
             wanted.accelerations

@@ -127,7 +127,11 @@ def length_lattice(
                 f"legs.{name}.stroke: a lattice of lengths needs the stroke of every actuated leg"
             )
     if int(mech.actuated.sum()) != mech.dof:
-        raise UnsupportedError(f"{mech.name}: a lattice of lengths needs as many actuated legs as freedoms")
+        raise UnsupportedError(
+            f"{mech.name}: a lattice of lengths needs as many actuated legs as freedoms: lengths of redundant legs "
+            "contradict one another at most nodes, and with an idle freedom poses differ by a spin that lengths "
+            "do not tell; workspace works with poses"
+        )
     step = float(widths.min() / DIVISIONS) if step is None else step
     layer = step if layer is None else layer
     for name, value in (("step", step), ("layer", layer)):

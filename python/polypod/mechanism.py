@@ -26,6 +26,7 @@ from polypod.answers import (
     ForwardKinematics,
     GraphJoint,
     GraphLink,
+    IdleFreedom,
     InverseDynamics,
     InverseKinematics,
     Joint,
@@ -107,6 +108,7 @@ class Mechanism:
         self._guessed_lengths = Arguments(lengths=(len(legs),), guess=(4, 4))
         self._rates = Arguments(pose=(4, 4), rates=(len(legs),))
         self._second_rates = Arguments(pose=(4, 4), twist=(6,), accelerations=(len(legs),))
+        self._chosen = Arguments(pose=(4, 4), twist=(6,), acceleration=(6,), preferred=(len(legs),))
         self._driven = Arguments(pose=(4, 4), twist=(6,), forces=(len(legs),))
         sets = self._core.coordinate_sets()
         self._sets = {set: tuple(names) for set, names, _ in sets}
@@ -168,6 +170,17 @@ class Mechanism:
     def dof(self) -> int:
         """Freedoms of the platform at generic poses."""
         return self._core.dof
+
+    @property
+    def n_rows(self) -> int:
+        """Rows of J: actuated legs, idle freedoms, independent constraints; 6, or more where actuators are
+        redundant."""
+        return self._core.rows
+
+    @property
+    def redundantly_actuated(self) -> bool:
+        """Whether more legs are actuated than it takes: forces are then a choice, and lengths must agree."""
+        return self.n_rows > 6
 
     @property
     def n_legs(self) -> int:
@@ -274,6 +287,7 @@ class Mechanism:
             redundant_legs=tuple(names[i] for i in m["redundant_legs"]),
             passive=m["passive"],
             uncontrolled=m["uncontrolled"],
+            idle=tuple(IdleFreedom(i["body"], (*i["point"],), (*i["axis"],)) for i in m["idle"]),
             passive_legs=tuple(names[i] for i in m["passive_legs"]),
             constraint_rows=tuple((names[c["leg"]], c["kind"]) for c in m["constraints"]),
             independent_rows=tuple(i for i, c in enumerate(m["constraints"]) if c["independent"]),
@@ -413,6 +427,9 @@ class Mechanism:
 
         V = (v, ω) at o in base axes, m/s and rad/s; the first three columns of a leg's row have no unit, the
         others are in m. For any pose (..., 4, 4), on the constraints or not.
+
+        Idle freedoms have rows (0, u) between those of legs and constraints, with the spin ω·u for a rate
+        [T67]. With redundant actuators J is (..., n_rows, 6) [T69].
         """
         (poses,) = POSE(pose)
         return self._core.jacobian(poses)["jacobian"]
@@ -421,7 +438,8 @@ class Mechanism:
         """(..., 6, 6, 6): H of `J A + Vᵀ H V = (ℓ'', 0)`, a symmetric layer for each row of J [Eq. 15-19].
 
         Twist and acceleration at o in base axes; a leg's layer is in 1/m, 1 and m for (v, v), (v, ω) and
-        (ω, ω). For any pose (..., 4, 4), on the constraints or not.
+        (ω, ω). For any pose (..., 4, 4), on the constraints or not. Idle freedoms have layers of zeros; with
+        redundant actuators H is (..., n_rows, 6, 6).
         """
         (poses,) = POSE(pose)
         return self._core.hessian(poses)["hessian"]
@@ -445,6 +463,9 @@ class Mechanism:
         Args:
             pose: (..., 4, 4).
             rates: of the legs, (..., n), m/s; those of passive legs are not read.
+
+        Idle freedoms do not spin. Rates of redundant actuators must agree to 1e-6 of their size; else the
+        status is INCONSISTENT and there is no twist [T70].
         """
         arrays = self._rates(pose, rates)
         return PlatformTwist(self, **self._core.platform_twist(*arrays))
@@ -458,6 +479,8 @@ class Mechanism:
             pose: (..., 4, 4).
             twist: (..., 6).
             accelerations: second rates of the legs, (..., n), m/s²; those of passive legs are not read.
+
+        Idle freedoms keep their spin; accelerations of redundant actuators must agree, as rates must.
         """
         arrays = self._second_rates(pose, twist, accelerations)
         return PlatformAcceleration(self, **self._core.platform_acceleration(*arrays))
@@ -477,6 +500,9 @@ class Mechanism:
         self, pose: ArrayLike, twist: ArrayLike = (0.0,) * 6, *, length: float | None = None
     ) -> Determinant:
         """Determinant of J in pure numbers, and its exact rate along a twist [T30].
+
+        With redundant actuators J has none: it is that of JᵀJ, which has no sign and is zero where J loses its
+        rank [T69].
 
         Args:
             pose: (..., 4, 4).
@@ -629,6 +655,12 @@ class Mechanism:
         SINGULAR where two modes meet, so that the pose is known to about 1e-7 only. Lengths that are negative
         or not finite give INVALID_INPUT.
 
+        Idle freedoms keep the spin of the guess [T67]. Lengths of redundant actuators must agree: the pose has
+        all of them, to 1e-6 of the characteristic length, or the status is INCONSISTENT and there is none,
+        only the `residual` of the nearest [T70]; there are no modes to jump between. A design that is singular
+        at every pose has a curve of poses for the lengths that it can have at all: the status is SINGULAR with
+        one of them, INCONSISTENT for lengths that it cannot have.
+
         >>> import polypod as pp
         >>> mech = pp.load("lu-3spu-2rpu-r")
         >>> pose = mech.pose({"alpha": 0.1, "p": -0.3, "h": 0.6, "beta": 0.8, "gamma": 0.6})
@@ -650,10 +682,12 @@ class Mechanism:
             lengths: (..., n), m; those of passive legs are not read.
 
         The first call for a mechanism finds all complex solutions for generic lengths, which takes some
-        tenths of a second.
+        tenths of a second. With an idle freedom a mode stands for all spins: its pose has the one that is
+        the shortest turn from home [T67]. Of redundant actuators all lengths are met; INCONSISTENT tells that
+        no pose has them all [T70].
 
         Raises:
-            UnsupportedError: not as many actuated legs as freedoms, or singular by design.
+            UnsupportedError: singular by design, or several idle freedoms.
 
         >>> import polypod as pp
         >>> mech = pp.load("lu-3spu-2rpu-r")
@@ -665,8 +699,8 @@ class Mechanism:
         found = self._core.assembly_modes(lengths)
         if found is None:
             raise UnsupportedError(
-                f"{self.name}: assembly modes need as many actuated legs as freedoms and a design that is "
-                "not singular everywhere; forward_kinematics finds a pose near a guess"
+                f"{self.name}: assembly modes need a design that is not singular everywhere and has at most one "
+                "idle freedom; forward_kinematics finds a pose near a guess"
             )
         table, counts, status = found
         count = np.array(counts, dtype=np.int64)
@@ -806,6 +840,8 @@ class Mechanism:
         acceleration: ArrayLike,
         wrench: ArrayLike | None = None,
         wrench_axes: str = "base",
+        *,
+        preferred: ArrayLike | None = None,
     ) -> InverseDynamics:
         """Active forces and constraint multipliers that keep up a motion under load [Eq. 40-43].
 
@@ -815,6 +851,10 @@ class Mechanism:
             acceleration: (..., 6).
             wrench: load on the platform at o, (..., 6), N and N m; the mechanism's own by default.
             wrench_axes: the axes of `wrench`, "base" or "platform".
+            preferred: active forces (n,) or (..., n), N, that redundant actuators should have as nearly as the
+                balance lets them, such as a preload; those of passive legs are not read. The answer is the
+                nearest in the sense of least squares; without it the least one [T69]. Where forces are
+                determined it has no effect.
 
         >>> import numpy as np, polypod as pp
         >>> mech = pp.load("lu-3spu-2rpu-r")
@@ -822,8 +862,13 @@ class Mechanism:
         >>> mech.inverse_dynamics(pose, np.zeros(6), np.zeros(6)).forces.round().tolist()
         [-13151.0, 9809.0, -4907.0, -1993.0, 10231.0]
         """
-        args = MOTION.loaded(wrench, wrench_axes, pose, twist, acceleration)
-        return InverseDynamics(self, **self._core.inverse_dynamics(*args))
+        if preferred is None:
+            args = MOTION.loaded(wrench, wrench_axes, pose, twist, acceleration)
+            return InverseDynamics(self, **self._core.inverse_dynamics(*args))
+        *motion, near, load, axes = self._chosen.loaded(
+            wrench, wrench_axes, pose, twist, acceleration, preferred
+        )
+        return InverseDynamics(self, **self._core.inverse_dynamics(*motion, load, axes, near))
 
     @cached_property
     def joint_list(self) -> tuple[Joint, ...]:

@@ -26,6 +26,7 @@ class Status(IntEnum):
     OUT_OF_CONE = 9
     MODE_JUMP = 10
     OUT_OF_ANGLE = 11
+    INCONSISTENT = 12
 
     @property
     def has_answer(self) -> bool:

@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections import Counter, defaultdict
 from collections.abc import Sequence
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -95,7 +96,8 @@ def describe(mech: Mechanism) -> dict[str, Any]:
             }
             for name, letters, actuated, length, stroke in legs
         ],
-        "mobility": {term: getattr(mobility, term) for term in _MOBILITY},
+        "mobility": {term: getattr(mobility, term) for term in _MOBILITY}
+        | {"idle": [asdict(idle) for idle in mobility.idle], "rows": mech.n_rows},
         "accounting": accounting(mobility),
         "links_by_joints": links_by_joints(mobility),
         "constraints": [

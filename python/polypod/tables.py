@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -68,7 +68,7 @@ def mobility_table(facts: Facts) -> Table:
     """The terms of mobility."""
     mobility = facts["mobility"]
     terms = (
-        ("freedoms of the platform", "dof", ""),
+        ("freedoms of the platform", "dof", _idle(mobility["idle"])),
         ("links, with the base", "links", ""),
         ("joints", "joints", ""),
         ("joint freedoms", "joint_freedoms", ""),
@@ -79,6 +79,23 @@ def mobility_table(facts: Facts) -> Table:
     )
     rows = [(term, str(mobility[key]), remark) for term, key, remark in terms]
     return Table("Mobility, from ranks at generic poses", ("", ">", ""), rows)
+
+
+def _idle(freedoms: Sequence[Mapping[str, Any]]) -> str:
+    """Those that no leg feels, in words."""
+    if not freedoms:
+        return ""
+    count = "one of them" if len(freedoms) == 1 else f"{len(freedoms)} of them"
+    lines = [
+        f"spin about the line through {_triple(row['point'], 1e3)} mm along {_triple(row['axis'])} "
+        f"({row['body']} axes)"
+        for row in freedoms
+    ]
+    return f"{count} idle: {'; '.join(lines)}, felt by no leg"
+
+
+def _triple(vector: Sequence[float], factor: float = 1.0) -> str:
+    return f"({', '.join(f'{factor * x + 0.0:.6g}' for x in vector)})"
 
 
 def accounting_table(facts: Facts) -> Table:

@@ -96,6 +96,7 @@ VARIABLES = _variables(
         "wrench": (_SIX, "N and N m", "(F_o, T_o)", "load on the platform at o, in its own axes"),
         "force": (_LEG, "N", "f_a", "active force of the leg"),
         "constraint": (_ROW, "N or N m", "f_c", "multiplier of the constraint"),
+        "idle_torque": (("idle",), "N m", "", "torque about the line of an idle freedom that no leg gives"),
         "coupled_force": (("coupled_leg",), "N", "f_c1, f_c3", "couple-constrained force"),
         "coupled_torque": (_ONE, "N m", "T_c", "couple-constrained torque on the rod"),
         "coupled_force_as_printed": (("coupled_leg",), "N", "f_c1, f_c3", "the same, Eq. 44 as printed"),

@@ -1,8 +1,6 @@
 //! From the description of a mechanism to the mechanism: what its parts must be to each other is checked here, on all
 //! parts that could be read, and every fault is reported at once.
 
-use std::cmp::Ordering;
-
 use crate::constraint;
 use crate::leg;
 use crate::limits;
@@ -38,8 +36,8 @@ pub fn assemble(spec: &Spec) -> Result<Mechanism, Vec<Fault>> {
     let mut mech = build(spec, home);
     let off_home = check_home(&mech);
     if off_home.is_empty() {
-        let (independent, mobility) = mobility::analyse(&mech);
-        mech.independent = independent;
+        let (independent, idle, mobility) = mobility::analyse(&mech);
+        (mech.independent, mech.idle) = (independent, idle);
         mech.mobility = mobility;
         mech.limits = limits::of(&mech, spec);
         faults.extend(check_freedoms(&mech));
@@ -78,6 +76,7 @@ fn build(spec: &Spec, home: Pose<f64>) -> Mechanism {
         tool_axis: spec.tool.axis.unit(),
         constraints,
         independent: Vec::new(),
+        idle: Vec::new(),
         characteristic_length,
         mobility: Mobility::default(),
         limits: Vec::new(),
@@ -105,7 +104,7 @@ fn check_home(mech: &Mechanism) -> Vec<Fault> {
         .collect()
 }
 
-/// Actuators and freedoms, and whether the two ways to count freedoms agree.
+/// Whether actuators can control the freedoms, and whether the two ways to count freedoms agree.
 fn check_freedoms(mech: &Mechanism) -> Option<Fault> {
     let (actuators, dof) = (mech.actuated().count(), mech.dof());
     let Mobility { joint_freedoms, closure_rank, passive, .. } = mech.mobility;
@@ -116,21 +115,20 @@ fn check_freedoms(mech: &Mechanism) -> Option<Fault> {
         );
         return Some(Fault::new("mechanism", message));
     }
-    let given = format!("{actuators} actuated legs for {dof} freedoms");
-    match actuators.cmp(&dof) {
-        _ if dof == 0 => {
-            Some(Fault::new("legs", "together they leave the platform no freedom; release a joint"))
-        }
-        Ordering::Less => Some(Fault::new("legs", format!("{given}; at least {dof} legs must be actuated"))),
-        Ordering::Greater => {
-            let surplus = actuators - dof;
-            let message = format!(
-                "{given}; redundant actuation is not supported: set `actuated = false` on {surplus} of them"
-            );
-            Some(Fault::new("legs", message))
-        }
-        Ordering::Equal => None,
+    let idle = mech.idle.len();
+    let needed = (dof - idle).max(1);
+    if dof == 0 {
+        return Some(Fault::new("legs", "together they leave the platform no freedom; release a joint"));
     }
+    let apart = match idle {
+        0 => String::new(),
+        1 => ", one of them idle".to_owned(),
+        _ => format!(", {idle} of them idle"),
+    };
+    let message = format!(
+        "{actuators} actuated legs for {dof} freedoms{apart}; at least {needed} legs must be actuated"
+    );
+    (actuators < needed).then(|| Fault::new("legs", message))
 }
 
 /// What parts must be to each other.

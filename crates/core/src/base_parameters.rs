@@ -7,7 +7,9 @@ use crate::inertial::{Parameter, Regressor};
 use crate::jacobian;
 use crate::mechanism::Mechanism;
 use crate::mobility;
-use crate::spatial::{Mat3, Motion, Pose};
+use crate::redundant;
+use crate::singularity;
+use crate::spatial::{Acceleration, Mat3, Motion, Pose, Twist};
 
 /// What is left of a column after all before it, relative to itself, where it counts as dependent on them.
 pub const DEPENDENT: f64 = 1e-8;
@@ -67,10 +69,10 @@ fn unit(p: &Parameter, scale: f64) -> f64 {
 
 /// Regressors of active forces at random states, each state's rows divided by their largest entry.
 fn stacked(mech: &Mechanism, regressor: &Regressor, units: &[f64]) -> Option<DMatrix<f64>> {
-    let (dof, width) = (mech.dof(), units.len());
-    let states = (SURPLUS * width).div_ceil(dof);
+    let (legs, width) = (mech.actuated().count(), units.len());
+    let states = (SURPLUS * width).div_ceil(legs);
     let mut draw = Draw(0x9E37_79B9_7F4A_7C15);
-    let mut rows = DMatrix::zeros(states * dof, width);
+    let mut rows = DMatrix::zeros(states * legs, width);
     let mut found = 0;
     for _ in 0..TRIES * states {
         if found == states {
@@ -78,10 +80,10 @@ fn stacked(mech: &Mechanism, regressor: &Regressor, units: &[f64]) -> Option<DMa
         }
         let Some(state) = random_state(mech, &mut draw) else { continue };
         let columns = regressor.columns(mech, &state);
-        let entries = DMatrix::from_fn(dof, width, |i, j| columns[j][i] * units[j]);
+        let entries = DMatrix::from_fn(legs, width, |i, j| columns[j][i] * units[j]);
         let size = entries.amax();
         if size.is_finite() && size > 0.0 {
-            rows.rows_mut(found * dof, dof).copy_from(&(entries / size));
+            rows.rows_mut(found * legs, legs).copy_from(&(entries / size));
             found += 1;
         }
     }
@@ -98,9 +100,22 @@ fn random_state(mech: &Mechanism, draw: &mut Draw) -> Option<Motion<f64>> {
         rotation: Mat3::from_rotation_vector(draw.vector(Draw::number) * SPREAD) * mech.home.rotation,
         o: mech.home.o + draw.vector(Draw::number) * (SPREAD * size),
     };
-    let rates: Vec<f64> = (0..mech.dof()).map(|_| draw.number() * (gravity * size).sqrt()).collect();
-    let accelerations: Vec<f64> = (0..mech.dof()).map(|_| draw.number() * gravity).collect();
+    let driven = mech.rows() - mech.independent.len();
+    let rates: Vec<f64> = (0..driven).map(|_| draw.number() * (gravity * size).sqrt()).collect();
+    let accelerations: Vec<f64> = (0..driven).map(|_| draw.number() * gravity).collect();
     let pose = mobility::project(&mech.constraints, size, &start)?;
+    if mech.is_redundant() {
+        // What legs do at random they do not agree on: the motion nearest to it is random, too.
+        let twist = redundant::platform_twist(mech, &pose, &rates).motion;
+        let found = redundant::platform_acceleration(mech, &pose, &twist, &accelerations);
+        let Twist { v, omega } = found.motion;
+        let well = singularity::smallest(mech, &pose, size) > PIVOTS;
+        return (found.regular && well).then_some(Motion {
+            pose,
+            twist,
+            acceleration: Acceleration::new(v, omega),
+        });
+    }
     let (twist, pivots) = jacobian::platform_twist(mech, &pose, &rates);
     let (acceleration, _) = jacobian::platform_acceleration(mech, &pose, &twist, &accelerations);
     (pivots > PIVOTS).then_some(Motion { pose, twist, acceleration })

@@ -8,6 +8,7 @@ use crate::constraint;
 use crate::coordinates::{self, Following, Set, Values, Variation, Varying};
 use crate::dynamics::{Answering, leg_wrench, load_in_base, own_wrench};
 use crate::geometry::{self, Parameter};
+use crate::idle;
 use crate::lanes::Lanes;
 use crate::leg;
 use crate::mechanism::{Leg, Mechanism};
@@ -47,6 +48,11 @@ pub(crate) fn by_motion<V: Lanes>(mech: &Mechanism, at: &Solved<V>) -> [Column<V
         for (i, leg) in mech.legs.iter().enumerate() {
             sum = sum + with_leg(mech, i, leg, &varied, &at.forces, &mut row);
         }
+        let legs = mech.dof() - mech.idle.len();
+        for k in 0..mech.idle.len() {
+            let torque = Dual::new(at.forces[legs + k], V::zero());
+            sum = sum + idle::row(&mech.idle[k], &varied.pose) * torque;
+        }
         for k in 0..mech.independent.len() {
             let multiplier = Dual::new(at.forces[mech.dof() + k], V::zero());
             sum = sum + constraint::row(&mech.independent[k], &varied.pose) * multiplier;
@@ -58,12 +64,12 @@ pub(crate) fn by_motion<V: Lanes>(mech: &Mechanism, at: &Solved<V>) -> [Column<V
 
 /// A leg's own wrench on the platform and that of its kept active force; `row` counts the legs that have one.
 #[inline(always)]
-fn with_leg<S: Constant<Dual<V>>, V: Lanes>(
+pub(crate) fn with_leg<S: Constant<Dual<V>>, V: Lanes>(
     mech: &Mechanism<S>,
     index: usize,
     leg: &Leg<S>,
     varied: &Motion<Dual<V>>,
-    forces: &Column<V>,
+    forces: &[V],
     row: &mut usize,
 ) -> Wrench<Dual<V>> {
     let place = leg::place(leg, &varied.pose);
@@ -77,7 +83,7 @@ fn with_leg<S: Constant<Dual<V>>, V: Lanes>(
 
 /// The motion as it varies with a step in all directions.
 #[inline(always)]
-fn along<V: Lanes>(at: &Motion<V>, step: &[V; DIRECTIONS]) -> Motion<Dual<V>> {
+pub(crate) fn along<V: Lanes>(at: &Motion<V>, step: &[V; DIRECTIONS]) -> Motion<Dual<V>> {
     let Motion { pose, twist, acceleration } = at;
     Motion {
         pose: pose.along(&Twist::new(part(step, 0), part(step, 1))),
@@ -138,7 +144,7 @@ fn rate_of<V: Lanes>(a: Vec3<Dual<V>>) -> Vec3<V> {
 }
 
 #[inline(always)]
-fn rate<V: Lanes>(w: Wrench<Dual<V>>) -> Wrench<V> {
+pub(crate) fn rate<V: Lanes>(w: Wrench<Dual<V>>) -> Wrench<V> {
     Wrench::new(rate_of(w.force), rate_of(w.torque))
 }
 
@@ -190,14 +196,30 @@ impl<V: Lanes> Coordinates<V> {
         varied: &Variation<V>,
         order: usize,
     ) -> Column<V> {
-        combined(by_motion, &step_of(&self.pose, &self.following.with(varied.by_rate(order))))
+        combined(by_motion, &self.step(varied, order))
+    }
+
+    /// How the motion varies then.
+    #[inline(always)]
+    pub(crate) fn step(&self, varied: &Variation<V>, order: usize) -> [V; DIRECTIONS] {
+        step_of(&self.pose, &self.following.with(varied.by_rate(order)))
+    }
+
+    /// How the motion follows a number of the geometry.
+    #[inline(always)]
+    pub(crate) fn following_geometry(&self, by: &Varied) -> [V; DIRECTIONS] {
+        if !by.moves {
+            return [V::zero(); DIRECTIONS];
+        }
+        let variation = V::apart(Varying { mech: &by.mech, set: &by.set, q: &self.q, number: None });
+        step_of(&self.pose, &self.following.with(variation))
     }
 }
 
 /// A mechanism that varies with one number of its geometry, or with none.
 #[derive(Clone, Debug)]
 pub(crate) struct Varied {
-    mech: Mechanism<Dual<f64>>,
+    pub(crate) mech: Mechanism<Dual<f64>>,
     set: Set<Dual<f64>>,
     /// The legs and independent constraints that vary.
     legs: Vec<usize>,
@@ -242,7 +264,7 @@ pub(crate) fn by_geometry<V: Lanes>(
     at: &Coordinates<V>,
     lengths: &mut [V],
 ) -> Column<V> {
-    let Varied { mech, set, legs, constraints, moves } = varied;
+    let Varied { mech, legs, constraints, moves, .. } = varied;
     // With the motion kept only some legs vary, and the rods that they lead.
     let still = along(&solved.platform, &[V::zero(); DIRECTIONS]);
     let mut sum = Wrench::zero();
@@ -253,14 +275,17 @@ pub(crate) fn by_geometry<V: Lanes>(
         }
         sum = sum + with_leg(mech, i, &mech.legs[i], &still, &solved.forces, &mut row);
     }
+    for k in 0..mech.idle.len() {
+        let torque = Dual::new(solved.forces[mech.dof() - mech.idle.len() + k], V::zero());
+        sum = sum + idle::row(&mech.idle[k], &still.pose) * torque;
+    }
     for &k in constraints {
         let multiplier = Dual::new(solved.forces[mech.dof() + k], V::zero());
         sum = sum + constraint::row(&mech.independent[k], &still.pose) * multiplier;
     }
     let (mut column, mut step) = (solved.answering.to(rate(sum)), [V::zero(); DIRECTIONS]);
     if *moves {
-        let variation = V::apart(Varying { mech, set, q: &at.q, number: None });
-        step = step_of(&at.pose, &at.following.with(variation));
+        step = at.following_geometry(varied);
         let moved = combined(by_motion, &step);
         for i in 0..6 {
             column[i] = column[i] + moved[i];

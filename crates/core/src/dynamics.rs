@@ -1,7 +1,7 @@
 //! Inverse dynamics by virtual power: every link's weight and inertia is carried to the platform's twist by the
 //! transpose of its own Jacobian, then actuators and constraints balance the sum [Eq. 40-43] \[T13\]-\[T17\].
 
-use crate::jacobian::{Matrix6, constraint_rows, scaled, scaled_jacobian};
+use crate::jacobian::{Matrix6, other_rows, scaled, scaled_jacobian};
 use crate::leg;
 use crate::linear::{solve, solve_all};
 use crate::mechanism::{Body, Leg, Mechanism, Rod};
@@ -171,7 +171,7 @@ pub fn resultant<T: Real>(
     sum
 }
 
-/// Active forces along the actuated legs, then the multipliers of the independent constraints:
+/// Active forces along the actuated legs, then the torques of idle freedoms and the multipliers of the independent constraints:
 /// `F_r = -J⁻ᵀ {...}` [Eq. 43], with the pivot ratio of J.
 #[inline(always)]
 pub fn inverse_dynamics<T: Real>(
@@ -220,7 +220,7 @@ impl<T: Real> Balance<T> {
     /// The forces and multipliers, once all legs are there.
     #[inline(always)]
     pub fn solved<S: Constant<T>>(mut self, mech: &Mechanism<S>, pose: &Pose<T>) -> ([T; 6], T::Value) {
-        constraint_rows(mech, pose, &mut self.rows[self.count..]);
+        other_rows(mech, pose, &mut self.rows[self.count..]);
         let w = self.wrench;
         let scaled_wrench = Wrench::new(w.force, w.torque * T::lit(1.0 / mech.characteristic_length));
         let mut rhs = scaled_wrench.array();

@@ -4,6 +4,7 @@
 //! [`modes`](crate::modes), where all of their solutions are followed.
 
 use crate::constraint;
+use crate::idle;
 use crate::leg;
 use crate::linear::solve;
 use crate::mechanism::Mechanism;
@@ -62,6 +63,11 @@ pub fn system<T: Real>(mech: &Mechanism, pose: &Pose<T>, squares: &[T; 6]) -> Sy
     for (_, leg) in mech.actuated() {
         let (e, r) = leg::vectors(leg, pose);
         system.put(count, scale, (r.dot(r) - squares[count]).scale(0.5), Wrench::at(e, r), scale * scale);
+        count += 1;
+    }
+    for idle in &mech.idle {
+        // No step spins.
+        system.put(count, scale, T::zero(), idle::row(idle, pose), 1.0);
         count += 1;
     }
     for c in &mech.independent {

@@ -1,6 +1,7 @@
 //! The numbers of the geometry: points and axes of joints and rods; and mechanisms that vary with one of them \[T56\].
 
 use crate::assembly;
+use crate::idle;
 use crate::mechanism::{Joint, Leg, Mechanism, Rod, Side, Turning};
 use crate::real::Dual;
 use crate::spatial::Vec3;
@@ -132,6 +133,7 @@ pub fn varied(mech: &Mechanism, by: Option<&Parameter>) -> Mechanism<Dual<f64>> 
         characteristic_length: mech.characteristic_length,
         mobility: mech.mobility.clone(),
         limits: mech.limits.clone(),
+        idle: mech.idle.iter().map(|idle| idle::varied(idle, &legs)).collect(),
         legs,
         rods,
         constraints,

@@ -5,6 +5,7 @@ use crate::dynamics::{self, Answering};
 use crate::leg;
 use crate::mechanism::{Body, Leg, Mechanism, Turning};
 use crate::real::{Dual, Real};
+use crate::redundant::Parted;
 use crate::spatial::{Mat3, Motion, Twist, Vec3, Wrench};
 
 /// A link that may have mass.
@@ -190,10 +191,17 @@ impl Regressor {
     }
 
     /// For each parameter the active forces and multipliers that its unit asks for: the columns of Y \[T57\].
-    pub fn columns(&self, mech: &Mechanism, platform: &Motion<f64>) -> Vec<[f64; 6]> {
+    pub fn columns(&self, mech: &Mechanism, platform: &Motion<f64>) -> Vec<Vec<f64>> {
         let legs: Vec<_> = mech.legs.iter().map(|leg| leg::state(leg, platform)).collect();
+        let count = self.parameters.len();
+        if mech.is_redundant() {
+            let Some(parted) = Parted::at(mech, &platform.pose) else {
+                return vec![vec![f64::NAN; mech.rows()]; count];
+            };
+            return (0..count).map(|k| parted.answer(self.wrench(mech, platform, &legs, k))).collect();
+        }
         let answering = Answering::at(mech, &platform.pose);
-        (0..self.parameters.len()).map(|k| self.column(mech, platform, &legs, &answering, k)).collect()
+        (0..count).map(|k| self.column(mech, platform, &legs, &answering, k).to_vec()).collect()
     }
 
     /// The k-th column, from the states of all legs.
@@ -206,6 +214,18 @@ impl Regressor {
         answering: &Answering<T>,
         k: usize,
     ) -> [T; 6] {
+        answering.to(self.wrench(mech, platform, legs, k))
+    }
+
+    /// What a unit of the k-th parameter puts on the platform.
+    #[inline(always)]
+    pub(crate) fn wrench<T: Real>(
+        &self,
+        mech: &Mechanism,
+        platform: &Motion<T>,
+        legs: &[leg::State<T>],
+        k: usize,
+    ) -> Wrench<T> {
         let mut sum = Wrench::zero();
         for (sign, body) in &self.units[k] {
             let wrench = match self.parameters[k].link {
@@ -216,7 +236,7 @@ impl Regressor {
             };
             sum = sum + wrench * T::lit(*sign);
         }
-        answering.to(sum)
+        sum
     }
 
     /// What load and damping ask for: the active forces and multipliers with all parameters zero.
@@ -227,7 +247,13 @@ impl Regressor {
         load: Wrench<T>,
         answering: &Answering<T>,
     ) -> [T; 6] {
-        answering.to((load + dynamics::damping_wrench(mech, twist)) * T::lit(1.0 / mech.efficiency))
+        answering.to(Self::rest(mech, twist, load))
+    }
+
+    /// What load and damping put on the platform.
+    #[inline(always)]
+    pub(crate) fn rest<T: Real>(mech: &Mechanism, twist: &Twist<T>, load: Wrench<T>) -> Wrench<T> {
+        (load + dynamics::damping_wrench(mech, twist)) * T::lit(1.0 / mech.efficiency)
     }
 
     /// From the columns of Y to the k-th of the derivatives by mass, mass centre, and inertia about it \[T57\].
@@ -237,6 +263,17 @@ impl Regressor {
         for &(column, factor) in &self.by_bodies[k] {
             for i in 0..6 {
                 sum[i] = sum[i] + columns[column][i].scale(factor);
+            }
+        }
+        sum
+    }
+
+    /// The same of columns of any length.
+    pub(crate) fn by_bodies_of(&self, columns: &[Vec<f64>], k: usize) -> Vec<f64> {
+        let mut sum = vec![0.0; columns[k].len()];
+        for &(column, factor) in &self.by_bodies[k] {
+            for (sum, x) in sum.iter_mut().zip(&columns[column]) {
+                *sum += x * factor;
             }
         }
         sum

@@ -1,7 +1,8 @@
-//! The completed Jacobian and Hessian: rows of the actuated legs over rows of the independent constraints, and the
-//! solves with them.
+//! The completed Jacobian and Hessian: rows of the actuated legs over those of idle freedoms and of the independent
+//! constraints, and the solves with them. Of mechanisms with six rows; [`redundant`](crate::redundant) has those with more.
 
 use crate::constraint;
+use crate::idle;
 use crate::leg;
 use crate::linear::solve;
 use crate::mechanism::Mechanism;
@@ -22,18 +23,20 @@ pub fn jacobian<T: Real>(mech: &Mechanism<impl Constant<T>>, pose: &Pose<T>) -> 
             count += 1;
         }
     }
-    constraint_rows(mech, pose, &mut rows[count..]);
+    other_rows(mech, pose, &mut rows[count..]);
     rows
 }
 
+/// Rows of idle freedoms, then those of constraints.
+
 #[inline(always)]
-pub(crate) fn constraint_rows<T: Real>(
-    mech: &Mechanism<impl Constant<T>>,
-    pose: &Pose<T>,
-    rows: &mut [[T; 6]],
-) {
+pub(crate) fn other_rows<T: Real>(mech: &Mechanism<impl Constant<T>>, pose: &Pose<T>, rows: &mut [[T; 6]]) {
+    let idle = mech.idle.len();
+    for k in 0..idle {
+        rows[k] = idle::row(&mech.idle[k], pose).array();
+    }
     for k in 0..mech.independent.len() {
-        rows[k] = constraint::row(&mech.independent[k], pose).array();
+        rows[idle + k] = constraint::row(&mech.independent[k], pose).array();
     }
 }
 
@@ -76,6 +79,8 @@ pub fn hessian<T: Real>(mech: &Mechanism<impl Constant<T>>, pose: &Pose<T>) -> [
             count += 1;
         }
     }
+    // The layers of idle freedoms are zero.
+    count += mech.idle.len();
     for c in &mech.independent {
         layers[count] = constraint::hessian(c, pose);
         count += 1;

@@ -187,20 +187,21 @@ impl Limit {
         &self,
         mech: &Mechanism,
         pose: &Pose<V>,
-        forces: &[V; 6],
+        forces: &[V],
         seen: &mut Seen<V>,
     ) -> V {
         self.bound.margin(match self.measure {
             Measure::Conditioning => smallest(mech, pose),
-            Measure::Force { row, .. } => forces[row],
+            Measure::Force { row, .. } if row < forces.len() => forces[row],
+            Measure::Force { .. } => V::lit(f64::NAN),
             _ => self.of_pose(mech, pose, seen),
         })
     }
 
     /// The same of one pose; without forces the margin of a force is NaN.
     #[must_use]
-    pub fn margin(&self, mech: &Mechanism, pose: &Pose<f64>, forces: Option<&[f64; 6]>) -> f64 {
-        self.margin_at(mech, pose, forces.unwrap_or(&[f64::NAN; 6]), &mut Seen::default())
+    pub fn margin(&self, mech: &Mechanism, pose: &Pose<f64>, forces: Option<&[f64]>) -> f64 {
+        self.margin_at(mech, pose, forces.unwrap_or_default(), &mut Seen::default())
     }
 }
 
@@ -325,9 +326,9 @@ fn rod_angle<T: Trig>(mech: &Mechanism, rod: usize, zero: &Zero, pose: &Pose<T>,
 ///
 /// # Panics
 /// If `out` has not one place for each limit.
-pub fn margins(mech: &Mechanism, pose: &Pose<f64>, forces: Option<&[f64; 6]>, out: &mut [f64]) {
+pub fn margins(mech: &Mechanism, pose: &Pose<f64>, forces: Option<&[f64]>, out: &mut [f64]) {
     assert_eq!(out.len(), mech.limits.len(), "one margin for each limit");
-    let (forces, mut seen) = (forces.unwrap_or(&[f64::NAN; 6]), Seen::default());
+    let (forces, mut seen) = (forces.unwrap_or_default(), Seen::default());
     for (margin, limit) in out.iter_mut().zip(&mech.limits) {
         *margin = limit.margin_at(mech, pose, forces, &mut seen);
     }

@@ -6,6 +6,7 @@
 
 use serde::Serialize;
 
+use crate::idle::{Idle, IdleRow};
 use crate::limits::Limit;
 use crate::spatial::{Mat3, Pose, Vec3, Wrench};
 use crate::spec::{Axes, JointKind};
@@ -178,8 +179,11 @@ pub struct Mobility {
     pub passive: usize,
     /// Legs (from 0) that have them.
     pub passive_legs: Vec<usize>,
-    /// Freedoms that remain at generic poses when all actuators are locked: zero unless the design itself is singular.
+    /// Freedoms, idle ones apart, that remain at generic poses when all actuators are locked: zero unless the design itself
+    /// is singular.
     pub uncontrolled: usize,
+    /// Freedoms that no leg feels by design: turns about lines of the platform or of the base \[T67\].
+    pub idle: Vec<IdleRow>,
     /// Scalar constraints of the legs: leg (from 0) and kind, and whether it is one of the independent ones.
     pub constraints: Vec<ConstraintRow>,
     pub graph: Graph,
@@ -210,6 +214,8 @@ pub struct Mechanism<S = f64> {
     pub constraints: Vec<Constraint<S>>,
     /// Those of them that are independent at generic poses, in the order of the legs.
     pub independent: Vec<Constraint<S>>,
+    /// Freedoms that no leg feels, each with a row of its own in the Jacobian, between those of legs and constraints \[T67\].
+    pub idle: Vec<Idle<S>>,
     /// Root mean square distance of the platform joints from o: what lengths are scaled by, m.
     pub characteristic_length: f64,
     pub mobility: Mobility,
@@ -224,6 +230,18 @@ impl<S> Mechanism<S> {
     #[must_use]
     pub fn dof(&self) -> usize {
         6 - self.independent.len()
+    }
+
+    /// Rows of the Jacobian: actuated legs, idle freedoms, independent constraints. Six, or more where actuators are redundant.
+    #[must_use]
+    pub fn rows(&self) -> usize {
+        self.actuated().count() + self.idle.len() + self.independent.len()
+    }
+
+    /// Whether more legs are actuated than it takes: the Jacobian then has more rows than columns \[T69\].
+    #[must_use]
+    pub fn is_redundant(&self) -> bool {
+        self.rows() > 6
     }
 
     /// Legs with an actuator, in the order of the Jacobian's rows.

@@ -6,6 +6,7 @@
 
 use crate::constraint;
 use crate::draw::Draw;
+use crate::idle::{self, Idle, IdleRow};
 use crate::leg;
 use crate::mechanism::{
     Constraint, ConstraintRow, Graph, GraphJoint, GraphLink, Leg, Mechanism, Mobility, Side, Turning,
@@ -16,7 +17,7 @@ use crate::svd::Svd;
 use nalgebra::{DMatrix, DVector};
 
 /// Singular values below this share of the largest count as zero.
-const RANK_TOLERANCE: f64 = 1e-9;
+pub(crate) const RANK_TOLERANCE: f64 = 1e-9;
 
 /// Generic poses looked at.
 const SAMPLES: u32 = 12;
@@ -29,12 +30,13 @@ pub fn count(n: usize) -> f64 {
     u32::try_from(n).map_or(f64::INFINITY, f64::from)
 }
 
-/// Independent constraints and the mobility of a mechanism whose parts are in place.
+/// Independent constraints, idle freedoms and the mobility of a mechanism whose parts are in place.
 #[must_use]
-pub fn analyse(mech: &Mechanism) -> (Vec<Constraint>, Mobility) {
+pub fn analyse(mech: &Mechanism) -> (Vec<Constraint>, Vec<Idle>, Mobility) {
     let poses = generic_poses(mech);
     let chosen = independent_rows(mech, &poses);
     let independent = chosen.iter().map(|&i| mech.constraints[i]).collect::<Vec<_>>();
+    let idle = idle::find(mech, &independent, &poses);
     let graph = graph(mech);
 
     let closures: Vec<Closure> = poses.iter().map(|pose| closure(mech, pose)).collect();
@@ -54,7 +56,12 @@ pub fn analyse(mech: &Mechanism) -> (Vec<Constraint>, Mobility) {
         redundant_legs: best.map_or_else(Vec::new, |c| c.redundant_legs.clone()),
         passive: best.map_or(0, |c| c.passive),
         passive_legs: best.map_or_else(Vec::new, |c| c.passive_legs.clone()),
-        uncontrolled: poses.iter().map(|pose| uncontrolled(mech, &independent, pose)).min().unwrap_or(0),
+        uncontrolled: poses
+            .iter()
+            .map(|pose| uncontrolled(mech, &independent, &idle, pose))
+            .min()
+            .unwrap_or(0),
+        idle: idle.iter().map(IdleRow::of).collect(),
         constraints: mech
             .constraints
             .iter()
@@ -67,7 +74,7 @@ pub fn analyse(mech: &Mechanism) -> (Vec<Constraint>, Mobility) {
             .collect(),
         graph,
     };
-    (independent, mobility)
+    (independent, idle, mobility)
 }
 
 fn joint_freedoms(kind: &str) -> usize {
@@ -79,7 +86,7 @@ fn joint_freedoms(kind: &str) -> usize {
 }
 
 /// Poses near home that satisfy the constraints, the same ones every time.
-fn generic_poses(mech: &Mechanism) -> Vec<Pose<f64>> {
+pub(crate) fn generic_poses(mech: &Mechanism) -> Vec<Pose<f64>> {
     let mut draw = Draw(0x2545_F491_4F6C_DD1D);
     let size = mech.characteristic_length;
     let mut poses = Vec::new();
@@ -167,11 +174,13 @@ fn rank_of(m: &DMatrix<f64>) -> usize {
     Svd::of(m).map_or(0, |svd| svd.rank(RANK_TOLERANCE))
 }
 
-/// Freedoms that are left when the actuated legs keep their lengths, at a pose.
-fn uncontrolled(mech: &Mechanism, independent: &[Constraint], pose: &Pose<f64>) -> usize {
+/// Freedoms, idle ones apart, that are left when the actuated legs keep their lengths, at a pose.
+fn uncontrolled(mech: &Mechanism, independent: &[Constraint], idle: &[Idle], pose: &Pose<f64>) -> usize {
     let size = mech.characteristic_length;
     let legs = mech.actuated().map(|(_, leg)| leg::row(&leg::position(leg, pose)));
-    let rows: Vec<Wrench<f64>> = legs.chain(independent.iter().map(|c| constraint::row(c, pose))).collect();
+    let others = independent.iter().map(|c| constraint::row(c, pose));
+    let rows: Vec<Wrench<f64>> =
+        legs.chain(others).chain(idle.iter().map(|idle| idle::row(idle, pose))).collect();
     let sizes: Vec<f64> = rows.iter().map(|row| constraint::row_unit(row, size)).collect();
     6 - rank_of(&scaled_rows(&rows, &sizes, size))
 }

@@ -6,12 +6,15 @@
 
 use crate::draw::Draw;
 use crate::forward::{self, Found, System, step_of, system};
+use crate::idle::Idle;
+use crate::least;
 use crate::leg;
 use crate::linear::solve;
-use crate::mechanism::Mechanism;
+use crate::mechanism::{Mechanism, Side};
 use crate::mobility::count;
 use crate::paths::{C, End, INFINITE, Path, modulus};
 use crate::real::Real;
+use crate::redundant;
 use crate::spatial::{Mat3, Pose, Vec3};
 use crate::status::Status;
 
@@ -63,6 +66,8 @@ pub struct Start {
     squares: [C; 6],
     poses: Vec<Pose<C>>,
     mirror: Option<Mirror>,
+    /// With as many of its legs actuated as it takes, where there are more.
+    square: Option<Box<Mechanism>>,
 }
 
 impl Start {
@@ -157,13 +162,18 @@ fn plane(points: &[Vec3<f64>]) -> Option<(Vec3<f64>, Vec3<f64>)> {
 /// and constraints are not six equations.
 #[must_use]
 pub fn start(mech: &Mechanism) -> Option<Start> {
-    if mech.actuated().count() != mech.dof() || mech.mobility.uncontrolled > 0 {
+    if mech.mobility.uncontrolled > 0 || mech.idle.len() > 1 {
         return None;
+    }
+    if mech.is_redundant() {
+        let square = redundant::square(mech)?;
+        let found = start(&square)?;
+        return Some(Start { square: Some(Box::new(square)), ..found });
     }
     let mut draw = Draw(0x9E37_79B9_7F4A_7C15);
     let home = squares_at(mech, &Pose::lift(&mech.home));
     let squares: [C; 6] = std::array::from_fn(|i| home[i] * (C::lit(1.0) + draw.complex().scale(GENERIC)));
-    let mut result = Start { squares, poses: Vec::new(), mirror: Mirror::of(mech) };
+    let mut result = Start { squares, poses: Vec::new(), mirror: Mirror::of(mech), square: None };
     // Every component of the set of complex poses has its own solutions: random poses reach each of them.
     for _ in 0..SEEDS {
         if let Some(pose) = random_pose(mech, &mut draw) {
@@ -242,14 +252,58 @@ fn norm(x: &[C; 6]) -> f64 {
     x.iter().map(|z| z.norm_sqr()).sum::<f64>().sqrt()
 }
 
-/// Distance of two poses as a pure number: of the columns of R, and of the points o in characteristic lengths, relative
+/// Distance of two poses as a pure number, idle spins apart: of the columns of R, and of the points o in characteristic lengths, relative
 /// to how far off o is. Complex rotations may be large; `RᵀR = 1` then holds and tells them apart only to the square of
 /// their size, by which the distance is divided.
 fn distance(mech: &Mechanism, a: &Pose<C>, b: &Pose<C>) -> f64 {
+    if let [idle] = &mech.idle[..] {
+        return distance_of_lines(mech, idle, a, b);
+    }
     let size = a.rotation.0.into_iter().map(modulus).fold(1.0, f64::max);
     let turned = a.rotation.0.iter().zip(b.rotation.0).map(|(&p, q)| modulus(p - q)).fold(0.0, f64::max);
     let moved = modulus(a.o - b.o) / (mech.characteristic_length + modulus(a.o));
     (turned / (size * size)).max(moved / size)
+}
+
+/// Where an idle line is at a pose, seen from the other body: its direction and its point.
+fn line<T: Real>(idle: &Idle, pose: &Pose<T>) -> (Vec3<T>, Vec3<T>) {
+    let (axis, point) = (Vec3::lift(idle.axis), Vec3::lift(idle.point));
+    match idle.side {
+        Side::Platform => (pose.rotation * axis, pose.o + pose.rotation * point),
+        Side::Base => (pose.rotation.transpose_mul(axis), pose.rotation.transpose_mul(point - pose.o)),
+    }
+}
+
+/// The same distance of what an idle spin leaves: of the line \[T67\].
+fn distance_of_lines(mech: &Mechanism, idle: &Idle, a: &Pose<C>, b: &Pose<C>) -> f64 {
+    let ((u, p), (v, q)) = (line(idle, a), line(idle, b));
+    let size = modulus(u).max(1.0);
+    (modulus(u - v) / (size * size)).max(modulus(p - q) / (mech.characteristic_length + modulus(p)) / size)
+}
+
+/// The pose with the idle line where it is, and the spin that is the shortest turn from home: a real one where the line is real.
+fn unspun(mech: &Mechanism, pose: &Pose<C>) -> Pose<C> {
+    let [idle] = &mech.idle[..] else { return *pose };
+    let real = |a: Vec3<C>| a.map(|e| e.re);
+    let (axis, point) = line(idle, pose);
+    let (home, _) = line(idle, &mech.home);
+    let turn = Mat3::shortest_turn(home, real(axis).unit());
+    let imaginary = |a: Vec3<C>| a.array().iter().map(|e| e.im.abs()).fold(0.0, f64::max);
+    let (fixed, off) = (Vec3::lift(idle.point), C::new(0.0, imaginary(axis)));
+    let mut found = Pose::lift(&mech.home);
+    match idle.side {
+        Side::Platform => {
+            found.rotation = Mat3::lift(turn * mech.home.rotation);
+            found.o = point - found.rotation * fixed;
+        }
+        Side::Base => {
+            found.rotation = Mat3::lift(mech.home.rotation * turn.transpose());
+            found.o = fixed - found.rotation * point;
+        }
+    }
+    // How far the line is from a real one still shows.
+    found.rotation.0[0].x = found.rotation.0[0].x + off;
+    found
 }
 
 /// A real pose with the lengths that were asked for.
@@ -273,6 +327,33 @@ pub struct Modes {
     pub modes: Vec<Mode>,
     /// Singular if modes meet, not converged if a path was lost, so that a mode may be missing.
     pub status: Status,
+}
+
+/// Every real pose with the given lengths of all actuated legs; passive ones are not read. Where legs are redundant, those of
+/// the square mechanism that meet the others as well \[T70\].
+#[must_use]
+pub fn assembly_modes_of_all(mech: &Mechanism, start: &Start, lengths: &[f64]) -> Modes {
+    let of = |mech: &Mechanism| -> Vec<f64> { mech.actuated().map(|(k, _)| lengths[k]).collect() };
+    let Some(square) = &start.square else { return assembly_modes(mech, start, &of(mech)) };
+    let all = of(mech);
+    if !all.iter().all(|l| *l >= 0.0 && l.is_finite()) {
+        return Modes { modes: vec![], status: Status::InvalidInput };
+    }
+    let Modes { mut modes, mut status } = assembly_modes(square, start, &of(square));
+    let some = !modes.is_empty();
+    modes.retain_mut(|mode| {
+        let Found { pose, residual, sign, status, .. } = least::forward_kinematics(mech, &all, &mode.pose);
+        let near = distance(mech, &Pose::lift(&pose), &Pose::lift(&mode.pose)) <= MEETING;
+        (mode.pose, mode.residual, mode.sign, mode.singular) =
+            (pose, residual, sign, status == Status::Singular);
+        near && matches!(status, Status::Ok | Status::Singular)
+    });
+    if some && modes.is_empty() && status != Status::NotConverged {
+        status = Status::Inconsistent;
+    } else if status == Status::Singular && !modes.iter().any(|mode| mode.singular) {
+        status = Status::Ok;
+    }
+    Modes { modes, status }
 }
 
 /// Every real pose with the given lengths of the actuated legs \[T28\].
@@ -328,6 +409,7 @@ fn all_kept(mech: &Mechanism, ends: &[End]) -> bool {
 
 /// The real pose that a complex solution is, if it is one.
 fn real_mode(mech: &Mechanism, squares: &[f64; 6], pose: &Pose<C>, up: Vec3<f64>) -> Option<Mode> {
+    let pose = &unspun(mech, pose);
     let o = pose.o * C::lit(1.0 / mech.characteristic_length);
     let parts = pose.rotation.0.iter().flat_map(|c| c.array()).chain(o.array());
     let imaginary = parts.map(|e| e.im.abs()).fold(0.0, f64::max);

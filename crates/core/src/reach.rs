@@ -5,6 +5,7 @@ use crate::dynamics;
 use crate::limits::{Limit, Measure};
 use crate::linear::solve;
 use crate::mechanism::Mechanism;
+use crate::redundant;
 use crate::spatial::{Acceleration, Motion, Pose, Twist, Vec3};
 
 /// Steps after which the search is given up.
@@ -97,15 +98,18 @@ fn checked(mech: &Mechanism, pose: &Pose<f64>) -> bool {
     mech.limits.iter().filter(|l| matches!(l.measure, Measure::Conditioning | Measure::Force { .. })).all(
         |limit| {
             let forces = matches!(limit.measure, Measure::Force { .. }).then(|| forces_at_rest(mech, pose));
-            limit.margin(mech, pose, forces.as_ref()) >= 0.0
+            limit.margin(mech, pose, forces.as_deref()) >= 0.0
         },
     )
 }
 
-fn forces_at_rest(mech: &Mechanism, pose: &Pose<f64>) -> [f64; 6] {
+fn forces_at_rest(mech: &Mechanism, pose: &Pose<f64>) -> Vec<f64> {
     let rest = Motion { pose: *pose, twist: Twist::zero(), acceleration: Acceleration::zero() };
     let load = dynamics::load_in_base(mech.load.wrench, mech.load.axes, pose);
-    dynamics::inverse_dynamics(mech, &rest, load).0
+    if mech.is_redundant() {
+        return redundant::inverse_dynamics(mech, &rest, load, &[]).forces;
+    }
+    dynamics::inverse_dynamics(mech, &rest, load).0.to_vec()
 }
 
 /// The margins of all limits at a pose, each in its own unit.
@@ -113,7 +117,7 @@ fn forces_at_rest(mech: &Mechanism, pose: &Pose<f64>) -> [f64; 6] {
 pub fn margins(mech: &Mechanism, pose: &Pose<f64>) -> Vec<f64> {
     let needs_forces = mech.limits.iter().any(|l| matches!(l.measure, Measure::Force { .. }));
     let forces = needs_forces.then(|| forces_at_rest(mech, pose));
-    mech.limits.iter().map(|l| l.margin(mech, pose, forces.as_ref())).collect()
+    mech.limits.iter().map(|l| l.margin(mech, pose, forces.as_deref())).collect()
 }
 
 /// The margin of the limit that is nearest relative to its scale; NaN without limits.

@@ -308,7 +308,11 @@ pub fn solve(
     scale: f64,
 ) -> Option<Reactions> {
     let mut solver = Solver::new(mech, joints, scale);
-    let holds = solver.solve(platform, load);
+    let holds = if mech.is_redundant() {
+        solver.solve_redundant(platform, load)
+    } else {
+        solver.solve(platform, load)
+    };
     let flags = |marks: &[[f64; 6]]| marks.iter().map(|marks| marks.map(|mark| mark > 0.0)).collect();
     holds.then(|| Reactions {
         determinate: flags(&solver.determinate),

@@ -1,6 +1,7 @@
 //! Reactions where several will do: all that balance the links, the self-stresses that they differ by, and the two choices
 //! among them \[T46\] \[T47\]. For one state or for one in each lane, in room that is made once.
 
+use crate::idle;
 use crate::lanes::{Lanes, any};
 use crate::mechanism::Mechanism;
 use crate::orthogonal::Orthogonal;
@@ -8,7 +9,8 @@ use crate::reactions::{
     Given, Joint, Place, constraint_wrench, pure, put_places, put_reactions, put_unbalanced,
 };
 use crate::real::{Mask, Real};
-use crate::spatial::{Motion, Vec3, Wrench};
+use crate::redundant::{self, Parted};
+use crate::spatial::{Motion, Pose, Vec3, Wrench};
 use crate::spec::JointKind;
 
 /// Least to greatest singular value of the platform's and the rods' balances below which the pose is singular.
@@ -33,6 +35,9 @@ pub(crate) struct Solver<'a, V> {
     mech: &'a Mechanism,
     joints: &'a [Joint],
     legs: Vec<LegBalance<V>>,
+    /// Wrenches on the platform that hold what nothing in the mechanism does: at o, torques divided by the characteristic
+    /// length.
+    props: Vec<Wrench<V>>,
     given: Given<V>,
     none: Given<V>,
     /// The balances of platform and rods, unknown being the shares of what the legs can carry.
@@ -58,12 +63,14 @@ struct LegBalance<V> {
     system: Orthogonal<V>,
     /// The first of its columns in the whole.
     first: usize,
+    /// The active force, where it is given.
+    push: V,
     particular: Wrench<V>,
     carried: Vec<Wrench<V>>,
 }
 
 impl<V: Lanes> LegBalance<V> {
-    fn new(joints: &[Joint], first: usize) -> Self {
+    fn new(joints: &[Joint], first: usize, pushed: bool) -> Self {
         let mut free: Vec<_> = joints
             .iter()
             .enumerate()
@@ -73,11 +80,15 @@ impl<V: Lanes> LegBalance<V> {
             // Turning about itself is free at either end, and is one motion: neither end can hold it.
             free.retain(|&at| at != (0, 4));
         }
+        if pushed {
+            free.push((1, 1));
+        }
         let carried = vec![Wrench::zero(); 6 - free.len()];
         LegBalance {
             system: Orthogonal::new(free.len(), 6),
             free,
             first,
+            push: V::zero(),
             particular: Wrench::zero(),
             carried,
         }
@@ -103,7 +114,8 @@ impl<V: Lanes> LegBalance<V> {
             for column in 0..6 {
                 self.system.set(row, column, entries[column]);
             }
-            rhs[row] = if k < 3 { axis.dot(given[j].force) } else { axis.dot(given[j].torque) };
+            // The one force that a joint does not leave free but is given is that of an actuator.
+            rhs[row] = if k < 3 { axis.dot(given[j].force) + self.push } else { axis.dot(given[j].torque) };
         }
         self.system.factor();
         self.system.solve(&mut rhs);
@@ -131,16 +143,21 @@ impl<'a, V: Lanes> Solver<'a, V> {
     pub(crate) fn new(mech: &'a Mechanism, joints: &'a [Joint], scale: f64) -> Self {
         let (rods, mut count, mut legs) = (mech.rods.len(), 0, Vec::new());
         for i in 0..mech.legs.len() {
-            let leg = LegBalance::new(&joints[rods + 3 * i..rods + 3 * i + 3], count);
+            let pushed = mech.is_redundant() && mech.legs[i].actuated;
+            let leg = LegBalance::new(&joints[rods + 3 * i..rods + 3 * i + 3], count, pushed);
             count += leg.carried.len();
             legs.push(leg);
         }
+        // Given forces of all actuators hold the platform in all its freedoms, the others in the idle ones.
+        let props = if mech.is_redundant() { mech.dof() } else { mech.idle.len() };
+        count += props;
         let (all, rows) = (joints.len(), 6 + rods);
         let free: usize = joints.iter().map(|joint| joint.free.len()).sum();
         Solver {
             mech,
             joints,
             legs,
+            props: vec![Wrench::zero(); props],
             given: Given::none(mech),
             none: Given::none(mech),
             // Fewer unknowns than equations has a design that actuators do not control: it has no answer.
@@ -161,13 +178,26 @@ impl<'a, V: Lanes> Solver<'a, V> {
     /// Finds all reactions that keep up a motion under load; tells where there are any, which is not at singular poses.
     #[inline(always)]
     pub(crate) fn solve(&mut self, platform: &Motion<V>, load: Wrench<V>) -> Mask<V> {
-        let (mech, pose) = (self.mech, &platform.pose);
-        put_places(mech, pose, &mut self.places);
+        let mech = self.mech;
         self.given.set(mech, platform, load);
+        for k in 0..mech.idle.len() {
+            self.props[k] = Wrench::new(Vec3::zero(), idle::axis(&mech.idle[k], &platform.pose));
+        }
+        self.solve_given(&platform.pose)
+    }
+
+    /// Balances what is given.
+    #[inline(always)]
+    fn solve_given(&mut self, pose: &Pose<V>) -> Mask<V> {
+        let mech = self.mech;
+        put_places(mech, pose, &mut self.places);
         self.set_up(pose.o);
         self.system.factor();
         let regular = self.system.reciprocal_condition();
         self.system.solve(&mut self.unknowns);
+        if !mech.is_redundant() {
+            self.add_idle_torques();
+        }
         self.put_on_platform(true);
         put_reactions(mech, &self.places, &self.given, &self.on_platform, &mut self.least);
         let holds = self.holds(pose.o, regular);
@@ -187,6 +217,22 @@ impl<'a, V: Lanes> Solver<'a, V> {
         holds
     }
 
+    /// What the props of idle freedoms do is given from now on.
+    #[inline(always)]
+    fn add_idle_torques(&mut self) {
+        let (length, first) = (self.mech.characteristic_length, self.props_from());
+        for k in 0..self.props.len() {
+            let Wrench { force, torque } = self.props[k] * self.unknowns[first + k];
+            self.given.platform = self.given.platform + Wrench::new(force, torque.scale(length));
+        }
+    }
+
+    /// The column of the first prop.
+    #[inline(always)]
+    fn props_from(&self) -> usize {
+        self.legs.last().map_or(0, |leg| leg.first + leg.carried.len())
+    }
+
     /// The balances of the platform at o and of the rods about their lines; those of the legs hold whatever their shares
     /// are \[T46\].
     #[inline(always)]
@@ -199,6 +245,16 @@ impl<'a, V: Lanes> Solver<'a, V> {
         }
         for row in 0..6 {
             self.unknowns[row] = -own[row];
+        }
+        let first = self.props_from();
+        for k in 0..self.props.len() {
+            let prop = self.props[k].array();
+            for row in 0..6 {
+                self.system.set(row, first + k, prop[row]);
+            }
+            for r in 0..rods {
+                self.system.set(6 + r, first + k, V::zero());
+            }
         }
         for r in 0..rods {
             self.unknowns[6 + r] = self.places[r].axes.0[0].dot(pure(self.given.rods[r], length).torque);
@@ -288,6 +344,26 @@ impl<'a, V: Lanes> Solver<'a, V> {
                 self.determinate_in_joint[j][k] = V::select(seen[k].at_most(open), one, zero);
             }
         }
+    }
+}
+
+impl Solver<'_, f64> {
+    /// The same where actuators are redundant: with their least forces \[T69\], which leave the platform's freedoms nothing to
+    /// hold. What the props hold shows as an error.
+    pub(crate) fn solve_redundant(&mut self, platform: &Motion<f64>, load: Wrench<f64>) -> bool {
+        let (mech, pose) = (self.mech, &platform.pose);
+        let Some(parted) = Parted::at(mech, pose).filter(|parted| parted.regular) else { return false };
+        let found = redundant::inverse_dynamics(mech, platform, load, &[]);
+        let mut forces = found.forces.iter();
+        for (leg, balance) in mech.legs.iter().zip(&mut self.legs) {
+            balance.push = if leg.actuated { forces.next().copied().unwrap_or(f64::NAN) } else { 0.0 };
+        }
+        self.given.set(mech, platform, load);
+        for (idle, torque) in mech.idle.iter().zip(&found.multipliers) {
+            self.given.platform = self.given.platform + idle::row(idle, pose) * *torque;
+        }
+        self.props = parted.freedoms(mech.idle.len());
+        self.solve_given(pose)
     }
 }
 

@@ -4,11 +4,13 @@
 use nalgebra::{DMatrix, DVector};
 
 use crate::constraint;
+use crate::idle::{self, Idle};
 use crate::jacobian::Matrix6;
 use crate::leg;
 use crate::linear;
 use crate::mechanism::{Constraint, Mechanism};
 use crate::real::{Dual, Ordered, Real};
+use crate::redundant;
 use crate::spatial::{Pose, Twist, Vec3, Wrench};
 use crate::svd::Svd;
 
@@ -114,7 +116,7 @@ pub struct Screw {
 /// A constraint's row for the twist (v, Λω), of a constraint counted as a length, in pure numbers: `(c, τ/Λ)`, and
 /// `(0, τ)` for kind D \[T30\].
 #[inline(always)]
-fn constraint_row<T: Real>(c: &Constraint, pose: &Pose<T>, scale: f64) -> [T; 6] {
+pub(crate) fn constraint_row<T: Real>(c: &Constraint, pose: &Pose<T>, scale: f64) -> [T; 6] {
     pure_row(constraint::row(c, pose) * T::lit(constraint::length(c, scale)), scale)
 }
 
@@ -134,6 +136,10 @@ pub fn pure_jacobian<T: Real>(mech: &Mechanism, pose: &Pose<T>, scale: f64) -> M
             count += 1;
         }
     }
+    for idle in &mech.idle {
+        rows[count] = idle_row(idle, pose, scale);
+        count += 1;
+    }
     for c in &mech.independent {
         rows[count] = constraint_row(c, pose, scale);
         count += 1;
@@ -141,14 +147,49 @@ pub fn pure_jacobian<T: Real>(mech: &Mechanism, pose: &Pose<T>, scale: f64) -> M
     rows
 }
 
+/// An idle freedom's row, counted as a constraint on a turn is: `(0, u)`.
+#[inline(always)]
+pub(crate) fn idle_row<T: Real>(idle: &Idle, pose: &Pose<T>, scale: f64) -> [T; 6] {
+    pure_row(idle::row(idle, pose) * T::lit(scale), scale)
+}
+
+/// JᵀJ in pure numbers, of any number of rows \[T69\].
+#[inline(always)]
+fn gram<T: Real>(mech: &Mechanism, pose: &Pose<T>, scale: f64) -> Matrix6<T> {
+    let mut sum = [[T::zero(); 6]; 6];
+    for leg in &mech.legs {
+        if leg.actuated {
+            add_square(&mut sum, &pure_row(leg::row(&leg::position(leg, pose)), scale));
+        }
+    }
+    for idle in &mech.idle {
+        add_square(&mut sum, &idle_row(idle, pose, scale));
+    }
+    for c in &mech.independent {
+        add_square(&mut sum, &constraint_row(c, pose, scale));
+    }
+    sum
+}
+
+#[inline(always)]
+fn add_square<T: Real>(sum: &mut Matrix6<T>, row: &[T; 6]) {
+    for i in 0..6 {
+        for j in 0..6 {
+            sum[i][j] = row[i].mul_add(row[j], sum[i][j]);
+        }
+    }
+}
+
 /// What rounding leaves of a determinant that is zero, relative to the product of its rows' sizes.
 const DETERMINANT_ROUNDING: f64 = 4e-15;
 
-/// det J, zero within rounding, and its exact rate along a twist \[T30\].
+/// det J, zero within rounding, and its exact rate along a twist \[T30\]; det JᵀJ where J has more rows than columns \[T69\].
 #[must_use]
 #[inline(always)]
 pub fn determinant<V: Ordered>(mech: &Mechanism, pose: &Pose<V>, twist: &Twist<V>, scale: f64) -> Dual<V> {
-    let rows = pure_jacobian(mech, &pose.along(twist), scale);
+    let moving = pose.along(twist);
+    let rows =
+        if mech.is_redundant() { gram(mech, &moving, scale) } else { pure_jacobian(mech, &moving, scale) };
     let (det, mut size) = (linear::determinant(&rows), V::one());
     for i in 0..6 {
         let mut square = V::zero();
@@ -164,6 +205,9 @@ pub fn determinant<V: Ordered>(mech: &Mechanism, pose: &Pose<V>, twist: &Twist<V
 /// The smallest singular value of J in pure numbers; NaN where an actuated leg has no direction.
 #[must_use]
 pub fn smallest(mech: &Mechanism, pose: &Pose<f64>, scale: f64) -> f64 {
+    if mech.is_redundant() {
+        return values_and_vectors(&redundant::pure_rows(mech, pose, scale)).0[5];
+    }
     values_and_vectors(&pure_jacobian(mech, pose, scale)).0[5]
 }
 
@@ -192,7 +236,27 @@ fn allowed(mech: &Mechanism, pose: &Pose<f64>, scale: f64, tolerance: f64) -> Al
     Allowed {
         sigma: if generic == 0 { f64::INFINITY } else { values[generic - 1] },
         lost: rank < generic,
-        basis: vectors.rows(rank, 6 - rank).into_owned(),
+        basis: without_idle(mech, pose, scale, vectors.rows(rank, 6 - rank).into_owned()),
+    }
+}
+
+/// The part of a basis of twists (v, Λω) that is square to the idle ones, which no leg is there to control \[T67\].
+fn without_idle(mech: &Mechanism, pose: &Pose<f64>, scale: f64, basis: DMatrix<f64>) -> DMatrix<f64> {
+    if mech.idle.is_empty() {
+        return basis;
+    }
+    let twists: Vec<[f64; 6]> = mech
+        .idle
+        .iter()
+        .map(|idle| {
+            let Twist { v, omega } = idle::twist(idle, pose);
+            Twist::new(v, omega * scale).array()
+        })
+        .collect();
+    let shares = DMatrix::from_fn(twists.len(), 6, |i, j| twists[i][j]) * basis.transpose();
+    match Svd::of(&shares) {
+        Some(svd) => svd.v_t.rows(twists.len(), basis.nrows() - twists.len()) * basis,
+        None => DMatrix::from_element(basis.nrows() - twists.len(), 6, f64::NAN),
     }
 }
 

@@ -28,10 +28,12 @@ pub enum Status {
     ModeJump = 10,
     /// A revolute joint or a rod turns beyond its range; the numbers stand.
     OutOfAngle = 11,
+    /// The legs contradict one another: nothing has all that is asked of them.
+    Inconsistent = 12,
 }
 
 impl Status {
-    pub const ALL: [Status; 12] = [
+    pub const ALL: [Status; 13] = [
         Status::Ok,
         Status::NoBranch,
         Status::Fold,
@@ -44,6 +46,7 @@ impl Status {
         Status::OutOfCone,
         Status::ModeJump,
         Status::OutOfAngle,
+        Status::Inconsistent,
     ];
 
     /// Whether there are numbers all the same: the pose is one, but beyond what the machine can reach.
@@ -93,6 +96,10 @@ impl Status {
             }
             Status::OutOfAngle => {
                 "a revolute joint or a rod turns beyond its range; the numbers stand, the machine cannot reach the pose"
+            }
+            Status::Inconsistent => {
+                "the legs contradict one another: no pose nearby has all these lengths, or no motion all these rates or \
+                 accelerations; more legs are actuated than the platform has freedoms, so that they must agree (1e-6)"
             }
             Status::InvalidInput => {
                 "the input holds NaN or infinity, or its rotation is not a rotation matrix"

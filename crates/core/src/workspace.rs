@@ -271,6 +271,10 @@ fn in_pieces(
     })
 }
 
+/// Of det J; that of det JᵀJ is always one.
 fn sign(mech: &Mechanism, pose: &Pose<f64>) -> f64 {
+    if mech.is_redundant() {
+        return 1.0;
+    }
     solve(scaled_jacobian(mech, pose), [0.0; 6]).sign
 }

@@ -64,7 +64,7 @@ const OPERATIONS: [(&str, Operation); 17] = [
     ("kinematics", |mech, a| batch::kinematics(mech, &a.states())),
     ("twist", |mech, a| batch::platform_twist(mech, &a.poses, &a.of_legs)),
     ("acceleration", |mech, a| batch::platform_acceleration(mech, &a.poses, &a.twists, &a.of_legs)),
-    ("inverse dynamics", |mech, a| batch::inverse_dynamics(mech, &a.states(), &Loads::Own)),
+    ("inverse dynamics", |mech, a| batch::inverse_dynamics(mech, &a.states(), &Loads::Own, None)),
     ("states", |mech, a| {
         let series = [&a.of_legs[..a.poses.len() / 16]; 3];
         let given = vec![Some(series), Some(series), Some(series), Some(series), Some(series)];
@@ -118,7 +118,7 @@ fn no_state_allocates_and_blocks_are_faster_than_single_states() {
         }
     };
     let in_blocks = || {
-        black_box(batch::inverse_dynamics(&mech, &many_arrays.states(), &Loads::Own));
+        black_box(batch::inverse_dynamics(&mech, &many_arrays.states(), &Loads::Own, None));
     };
     let least = |run: &dyn Fn()| {
         let time = || {

@@ -139,6 +139,12 @@ impl PyMechanism {
         self.0.dof()
     }
 
+    /// Of the Jacobian.
+    #[getter]
+    fn rows(&self) -> usize {
+        self.0.rows()
+    }
+
     #[getter]
     fn characteristic_length(&self) -> f64 {
         self.0.characteristic_length
@@ -326,7 +332,9 @@ impl PyMechanism {
         arrays(py, table, &batch)
     }
 
-    #[pyo3(signature = (poses, twists, accelerations, wrenches, platform_axes))]
+    /// With the forces of all legs that are preferred where they are not determined.
+    #[pyo3(signature = (poses, twists, accelerations, wrenches, platform_axes, preferred=None))]
+    #[allow(clippy::too_many_arguments)]
     fn inverse_dynamics<'py>(
         &self,
         py: Python<'py>,
@@ -335,9 +343,16 @@ impl PyMechanism {
         accelerations: Array<'py>,
         wrenches: Option<Array<'py>>,
         platform_axes: bool,
+        preferred: Option<Array<'py>>,
     ) -> PyResult<Bound<'py, PyDict>> {
-        let motion = [&poses, &twists, &accelerations];
-        self.loaded(py, motion, wrenches.as_ref(), platform_axes, batch::inverse_dynamics)
+        let states = states(&poses, &twists, &accelerations)?;
+        let loads = loads(wrenches.as_ref(), platform_axes, states.poses)?;
+        let preferred = preferred.as_ref().map(slice).transpose()?;
+        if let Some(preferred) = preferred {
+            expect(preferred, self.0.legs.len(), states.poses)?;
+        }
+        let table = py.detach(|| batch::inverse_dynamics(&self.0, &states, &loads, preferred));
+        arrays(py, table, &batch_of(&poses, 2))
     }
 
     #[pyo3(signature = (poses, twists, forces, wrenches, platform_axes))]

@@ -104,6 +104,9 @@ class Multibody:
     """What lengths are divided by where they stand beside angles, m."""
     geometry: Mapping[str, Any]
     """The mechanism file's numbers in SI, as `Mechanism.geometry`."""
+    idle: tuple[tuple[str, Array], ...] = ()
+    """Turns of the platform that no leg feels: the body that their line is fixed in, BASE or PLATFORM, and the
+    line's direction (3,) in its axes."""
 
     @property
     def zero(self) -> Placements:
@@ -144,6 +147,7 @@ def describe(mech: Mechanism) -> Multibody:
         rods=tuple(rod_body(rod) for rod in geometry["rods"]),
         scale=mech.characteristic_length,
         geometry=geometry,
+        idle=tuple((idle.body, np.array(idle.axis)) for idle in mech.mobility().idle),
     )
 
 

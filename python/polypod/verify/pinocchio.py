@@ -303,14 +303,14 @@ class Twin:
             return {"closure": moved.residual, "steps": moved.steps}, moved.status
         tree.set(moved)
         found = self._kinematics(moved)
-        forces, freedoms, status = self._forces(moved, twist, wrench)
-        found |= {"forces": forces, "freedoms": freedoms, "closure": moved.residual, "steps": moved.steps}
+        forces, torques, freedoms, status = self._forces(moved, pose, twist, wrench)
+        found |= {"forces": forces, "idle_torques": torques, "freedoms": freedoms, "closure": moved.residual, "steps": moved.steps}
         if status is not Status.OK:
             return found, status
         free = self.free.move(self.free.start(tree.placements()), pose, twist, acceleration)
         if free.status is not Status.OK:
             return found, free.status
-        held = self._constraint_wrench(free, forces, pose, twist, wrench)
+        held = self._constraint_wrench(free, forces, torques, pose, twist, wrench)
         return found | {"constraint_force": held[:3], "constraint_torque": held[3:]}, status
 
     def _kinematics(self, moved: Moved) -> dict[str, Any]:
@@ -338,10 +338,13 @@ class Twin:
             "rod_eps": of(tree.acceleration, rods, turn),
         }
 
-    def _forces(self, moved: Moved, twist: Array, wrench: Array) -> tuple[Array, int, Status]:
+    def _forces(
+        self, moved: Moved, pose: Array, twist: Array, wrench: Array
+    ) -> tuple[Array, Array, int, Status]:
         """Forces of the prismatic joints that do the work of all others on all allowed motions [T61].
 
-        Also the number of allowed motions, and whether they determine the forces.
+        With them the torques about the lines of idle freedoms, the number of allowed motions, and whether
+        they determine the forces; redundant ones are the least.
         """
         tree = self.tree
         required = tree.required(moved, twist, wrench)
@@ -350,19 +353,30 @@ class Twin:
         allowed = tree.units[:, None] * right[rank:].T
         driven = tree.slides[self.actuated]
         forces = np.zeros(len(tree.slides))
-        found, _, determined, _ = np.linalg.lstsq(allowed[driven].T, allowed.T @ required, rcond=RANK)
-        forces[self.actuated] = found
-        status = Status.OK if determined == len(driven) else Status.SINGULAR
-        return forces, allowed.shape[1], status
+        spins = self._spins(tree, pose)
+        work = np.hstack([allowed[driven].T, allowed.T @ spins])
+        found, _, determined, _ = np.linalg.lstsq(work, allowed.T @ required, rcond=RANK)
+        forces[self.actuated] = found[: len(driven)]
+        freedoms = np.linalg.matrix_rank(allowed[tree.platform], rtol=RANK)
+        status = Status.OK if determined == min(work.shape[1], freedoms) else Status.SINGULAR
+        return forces, found[len(driven) :], allowed.shape[1], status
+
+    def _spins(self, tree: Tree, pose: Array) -> Array:
+        """(nv, idle): generalised forces of a unit torque about the line of each idle freedom."""
+        spins = np.zeros((tree.model.nv, len(tree.tree.idle)))
+        for k, (body, axis) in enumerate(tree.tree.idle):
+            spins[tree.platform[3:], k] = axis if body == PLATFORM else pose[:3, :3].T @ axis
+        return spins
 
     def _constraint_wrench(
-        self, moved: Moved, forces: Array, pose: Array, twist: Array, wrench: Array
+        self, moved: Moved, forces: Array, torques: Array, pose: Array, twist: Array, wrench: Array
     ) -> Array:
         """(6,): what the constraints do on the platform, at o in base axes, legs continued off them [T62]."""
         tree = self.free
         tree.set(moved)
         required = tree.required(moved, twist, wrench)
         required[tree.slides] -= forces
+        required -= self._spins(tree, pose) @ torques
         # How the joints follow each of the six motions of the free platform.
         jacobian = moved.jacobian
         follow = np.linalg.lstsq(jacobian[:, tree.passive], -jacobian[:, tree.platform], rcond=RANK)[0]

@@ -15,6 +15,7 @@ from polypod.arrays import check_wrench_axes
 from polypod.errors import MissingEngineError, PolypodError, ShapeError, UnknownNameError
 from polypod.mechanism import Mechanism
 from polypod.motion import Motion
+from polypod.multibody.placement import PLATFORM
 from polypod.multibody.tree import Multibody, describe
 from polypod.solution import states_along
 from polypod.status import Status
@@ -67,6 +68,7 @@ QUANTITIES: dict[str, tuple[str, str, str]] = {
     "rod_omega": ("rods, ang. velocity", "rad/s", "angular speed"),
     "rod_eps": ("rods, ang. accel.", "rad/s^2", "angular acceleration"),
     "forces": ("active forces", "N", "force"),
+    "idle_torques": ("idle torques", "N m", "torque"),
     "constraint_force": ("constraint forces", "N", "force"),
     "constraint_torque": ("constraint torques", "N m", "torque"),
 }
@@ -395,7 +397,9 @@ def _own_answers(mech: Mechanism, states: States) -> tuple[Values, NDArray[np.in
     values["platform_eps"] = states.acceleration[:, 3:]
     values["freedoms"] = np.full(len(states.pose), float(mobility.dof + mobility.passive))
     values["forces"] = dynamics.forces
-    rows = mech.jacobian(states.pose)[:, mech.dof :]
+    if mobility.idle:
+        values["idle_torques"] = dynamics.idle_torques
+    rows = mech.jacobian(states.pose)[:, mech.n_rows - (6 - mech.dof) :]
     if rows.shape[1]:
         # The multipliers as one wrench at o, whatever the units and signs of the single constraints.
         wrench = np.einsum("nk,nki->ni", dynamics.constraint, rows)
@@ -429,6 +433,8 @@ def _compare(
     twin: Any = kind(tree)
     driven = ENGINES[name].approximate is not None
     loads = load_at_o(tree.geometry, states.pose, *states.load)
+    if driven and "idle_torques" in mine:
+        loads = loads + _idle_loads(tree, states.pose, mine["idle_torques"])
     for i, (pose, twist, acceleration) in enumerate(zip(*states[:3], strict=True)):
         if driven:
             found, status = twin.answer(pose, twist, loads[i], mine["forces"][i])
@@ -481,6 +487,15 @@ def _compare(
         good and bool(rows) and len(both) == len(states.pose),
         tuple(twin.notes()) if driven else (),
     )
+
+
+def _idle_loads(tree: Multibody, pose: Array, torques: Array) -> Array:
+    """(N, 6): torques about the lines of idle freedoms as loads, which the efficiency divides."""
+    found = np.zeros((len(pose), 6))
+    for (body, axis), torque in zip(tree.idle, np.nan_to_num(torques).T, strict=True):
+        along = pose[:, :3, :3] @ axis if body == PLATFORM else np.broadcast_to(axis, (len(pose), 3))
+        found[:, 3:] += tree.geometry["efficiency"] * torque[:, None] * along
+    return found
 
 
 def _finite(value: float) -> float | None:

@@ -2,7 +2,7 @@
 
 use super::block::{self, Answers, At, Codes, Working};
 use super::checks::{solved, within_limits};
-use super::{FieldId, Loads, States, Table};
+use super::{FieldId, Loads, States, Table, redundant};
 use crate::coordinates::{DEPENDENT_PIVOTS, MAX_COORDINATES, Set};
 use crate::derivatives::{self, Column, Coordinates, DIRECTIONS, Solved, Varied};
 use crate::dynamics::{Answering, resultant};
@@ -52,6 +52,9 @@ pub fn inverse_dynamics_derivatives(
         ("constraint_by_geometry", vec![multipliers, geometry.len()]),
         ("lengths_by_geometry", vec![forces, geometry.len()]),
     ];
+    if mech.is_redundant() {
+        return redundant::inverse_dynamics_derivatives(mech, states, loads, set, &given, fields);
+    }
     let varied = geometry.iter().map(|parameter| Varied::new(mech, parameter, set));
     let operation = Derivatives {
         mech,
@@ -204,6 +207,9 @@ pub fn regressors(mech: &Mechanism, states: &States, loads: &Loads) -> Table {
         ("forces_offset", vec![forces]),
         ("constraint_offset", vec![multipliers]),
     ];
+    if mech.is_redundant() {
+        return redundant::regressors(mech, states, loads, fields);
+    }
     let operation = Regressors { mech, states, loads, regressor: Regressor::new(mech) };
     block::table(&operation, states.len(), fields)
 }

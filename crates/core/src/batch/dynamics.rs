@@ -2,8 +2,9 @@
 
 use super::block::{self, Answers, At, Codes, Operation};
 use super::checks::{finite, pose_at, solved, with_leg, with_motion, within_limits, within_limits_of};
-use super::{FieldId, States, Table};
+use super::{FieldId, States, Table, redundant};
 use crate::dynamics::{self, Balance};
+use crate::idle;
 use crate::lanes::Lanes;
 use crate::leg;
 use crate::limits::Seen;
@@ -41,10 +42,23 @@ impl Loads<'_> {
     }
 }
 
-/// Active forces of all legs (zero for passive ones) and multipliers of the independent constraints [Eq. 43].
+/// Active forces of all legs (zero for passive ones), multipliers of the independent constraints and torques of idle freedoms
+/// [Eq. 43] \[T67\]. Where actuators are redundant, the forces nearest to the preferred ones of all legs, zero for none \[T69\].
 #[must_use]
-pub fn inverse_dynamics(mech: &Mechanism, states: &States, loads: &Loads) -> Table {
-    let fields = [("forces", vec![mech.legs.len()]), ("constraint", vec![mech.independent.len()])];
+pub fn inverse_dynamics(
+    mech: &Mechanism,
+    states: &States,
+    loads: &Loads,
+    preferred: Option<&[f64]>,
+) -> Table {
+    if mech.is_redundant() {
+        return redundant::inverse_dynamics(mech, states, loads, preferred);
+    }
+    let fields = [
+        ("forces", vec![mech.legs.len()]),
+        ("constraint", vec![mech.independent.len()]),
+        ("idle_torques", vec![mech.idle.len()]),
+    ];
     block::table(&InverseDynamics { mech, states, loads }, states.len(), fields)
 }
 
@@ -54,10 +68,10 @@ struct InverseDynamics<'a> {
     loads: &'a Loads<'a>,
 }
 
-impl Operation<2> for InverseDynamics<'_> {
+impl Operation<3> for InverseDynamics<'_> {
     #[inline(always)]
-    fn run<V: Lanes>(&self, at: At, answers: &mut Answers<'_, 2>) -> Codes<V> {
-        let (mech, [forces, multipliers]) = (self.mech, Answers::fields());
+    fn run<V: Lanes>(&self, at: At, answers: &mut Answers<'_, 3>) -> Codes<V> {
+        let (mech, [forces, multipliers, torques]) = (self.mech, Answers::fields());
         let (platform, codes) = self.states.platform(at);
         let (pose, load) = (&platform.pose, self.loads.of(mech, &platform.pose, at));
         let mut balance = Balance::new(mech, &platform, load);
@@ -76,6 +90,9 @@ impl Operation<2> for InverseDynamics<'_> {
         put_forces(mech, answers, forces, &f);
         for k in 0..mech.independent.len() {
             answers.put(multipliers, k, [f[mech.dof() + k]]);
+        }
+        for k in 0..mech.idle.len() {
+            answers.put(torques, k, [f[mech.dof() - mech.idle.len() + k]]);
         }
         within_limits_of(mech, pose, &mut seen, solved(mech, &f, pivots, codes))
     }
@@ -152,6 +169,9 @@ pub fn power(mech: &Mechanism, states: &States, loads: &Loads) -> Table {
         "friction",
         "residual",
     ];
+    if mech.is_redundant() {
+        return redundant::power(mech, states, loads, names, |platform| energy_along(mech, platform));
+    }
     block::table(&Power { mech, states, loads }, states.len(), names.map(|name| (name, vec![])))
 }
 
@@ -178,6 +198,10 @@ impl Operation<9> for Power<'_> {
                 actuators = actuators + leg::row(&leg::position(leg, pose)).power(twist) * f[row];
                 row += 1;
             }
+        }
+        for idle in &mech.idle {
+            actuators = actuators + idle::row(idle, pose).power(twist) * f[row];
+            row += 1;
         }
         actuators = V::select(regular, actuators, V::lit(f64::NAN));
         // What the efficiency takes: actuators serve the platform's term of [Eq. 42] 1/η times.

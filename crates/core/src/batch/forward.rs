@@ -6,6 +6,7 @@ use super::checks::{actuated_values, is_rotation, joint_limits, raw_pose, then, 
 use crate::forward::{self, Found};
 use crate::forward_lanes::{Poses, forward_kinematics_of, load, load_squares, put, put_squares};
 use crate::lanes::{self, Lanes, Row, Task, WIDTH};
+use crate::least;
 use crate::limits::Seen;
 use crate::mechanism::Mechanism;
 use crate::modes::{self, Start};
@@ -32,7 +33,7 @@ pub fn forward_kinematics(
     };
     let fields = [("pose", vec![4, 4]), ("residual", vec![]), ("iterations", vec![])];
     let asked = |i: usize| actuated_values(mech, lengths, i);
-    if !continued {
+    if !continued && !least::serves(mech) {
         return block::in_pieces(n, fields, IN_LANES, |rows, piece| {
             let (mut states, mut numbers) = (Vec::with_capacity(WIDTH), Vec::with_capacity(WIDTH));
             let last = piece.end;
@@ -56,28 +57,46 @@ pub fn forward_kinematics(
             }
         });
     }
-    block::in_pieces(n, fields, Pieces::WHOLE, |rows, states| {
+    let pieces = if continued { Pieces::WHOLE } else { Pieces::SLOW };
+    block::in_pieces(n, fields, pieces, |rows, states| {
         // The last pose that was solved, and the one of the state before it.
         let (mut last, mut before, mut solved) = (None, None, false);
         for i in states {
-            let Some(guess) = last.or_else(|| guess(i)) else {
+            let Some(guess) = last.filter(|_| continued).or_else(|| guess(i)) else {
                 rows.set_status(i, Status::InvalidInput);
                 continue;
             };
             let values = asked(i);
-            let mut found = forward::forward_kinematics(mech, &values, &guess);
-            if let (Some(last), Some(before), Status::Ok) = (last, before, found.status) {
+            let mut found = found_near(mech, &values, &guess);
+            if let (Some(last), Some(before), Status::Ok, false) =
+                (last, before, found.status, least::serves(mech))
+            {
                 found = forward::passed(mech, &values, &before, &last, &found).unwrap_or(found);
             }
             let status = then(found.status, || check_found(mech, &values, &found.pose));
             put_found(rows, i, &found, status);
-            let unsolved = [Status::NotConverged, Status::InvalidInput, Status::Singular, Status::ModeJump]
-                .contains(&status);
+            let unsolved = [
+                Status::NotConverged,
+                Status::InvalidInput,
+                Status::Singular,
+                Status::ModeJump,
+                Status::Inconsistent,
+            ]
+            .contains(&status);
             (last, before) =
                 if unsolved { (last, None) } else { (Some(found.pose), last.filter(|_| solved)) };
             solved = !unsolved;
         }
     })
+}
+
+/// The pose with these lengths that belongs to a guess.
+fn found_near(mech: &Mechanism, lengths: &[f64], guess: &Pose<f64>) -> Found {
+    if least::serves(mech) {
+        least::forward_kinematics(mech, lengths, guess)
+    } else {
+        forward::forward_kinematics(mech, lengths, guess)
+    }
 }
 
 /// So many lengths at least are worth a thread of their own.
@@ -88,8 +107,11 @@ fn put_found(rows: &mut Rows<'_, 3>, i: usize, found: &Found, status: Status) {
     let Found { pose, residual, iterations, .. } = *found;
     let [poses, residuals, counts] = block::fields();
     rows.set_status(i, status);
-    if !matches!(status, Status::NotConverged | Status::InvalidInput) {
+    let known = !matches!(status, Status::NotConverged | Status::InvalidInput);
+    if known && status != Status::Inconsistent {
         rows.set(poses, i, 0, &pose.matrix());
+    }
+    if known {
         rows.set(residuals, i, 0, &[residual]);
     }
     rows.set(counts, i, 0, &[f64::from(iterations)]);
@@ -97,6 +119,10 @@ fn put_found(rows: &mut Rows<'_, 3>, i: usize, found: &Found, status: Status) {
 
 /// Whether a pose that was found for lengths is one that the mechanism can be in, and within its limits.
 fn check_found(mech: &Mechanism, asked: &[f64], pose: &Pose<f64>) -> Status {
+    if mech.is_redundant() {
+        let missed = least::error(mech, asked, pose);
+        return within_limits_missed::<f64>(mech, pose, missed).status();
+    }
     block::read(checks(mech, [(asked, pose)])[0]).0
 }
 
@@ -127,19 +153,25 @@ impl Task for Checks<'_> {
         while k < WIDTH {
             let pose = load::<V>(self.poses, k);
             let missed = forward::error(mech, &load_squares(self.squares, k), &pose);
-            let mut codes = with_legs(mech, &pose, Codes::ok());
-            let mut seen = Seen::default();
-            for limit in joint_limits(mech) {
-                let mut margin = limit.bound.margin(limit.of_joint(mech, &pose, &mut seen));
-                if limit.status() == Status::OutOfStroke {
-                    margin = margin + missed;
-                }
-                codes = codes.unless(V::zero().at_most(margin), limit.status());
-            }
-            codes.store(&mut self.codes[k..]);
+            within_limits_missed(mech, &pose, missed).store(&mut self.codes[k..]);
             k += V::WIDTH;
         }
     }
+}
+
+/// The first limit of a joint that a pose breaks which may miss lengths by so much.
+#[inline(always)]
+fn within_limits_missed<V: Lanes>(mech: &Mechanism, pose: &Pose<V>, missed: V) -> Codes<V> {
+    let mut codes = with_legs(mech, pose, Codes::ok());
+    let mut seen = Seen::default();
+    for limit in joint_limits(mech) {
+        let mut margin = limit.bound.margin(limit.of_joint(mech, pose, &mut seen));
+        if limit.status() == Status::OutOfStroke {
+            margin = margin + missed;
+        }
+        codes = codes.unless(V::zero().at_most(margin), limit.status());
+    }
+    codes
 }
 
 /// All assembly modes of each set of lengths, one after the other, and how many belong to each set \[T28\].
@@ -152,11 +184,16 @@ pub struct AllModes {
     pub status: Vec<Status>,
 }
 
+/// The lengths of all legs of a state.
+fn lengths_of<'a>(mech: &Mechanism, lengths: &'a [f64], i: usize) -> &'a [f64] {
+    &lengths[i * mech.legs.len()..][..mech.legs.len()]
+}
+
 #[must_use]
 pub fn assembly_modes(mech: &Mechanism, start: &Start, lengths: &[f64]) -> AllModes {
     let n = lengths.len() / mech.legs.len();
     let asked = |i: usize| actuated_values(mech, lengths, i);
-    let found = block::each(n, |i| modes::assembly_modes(mech, start, &asked(i)));
+    let found = block::each(n, |i| modes::assembly_modes_of_all(mech, start, lengths_of(mech, lengths, i)));
     let all: Vec<(usize, &modes::Mode)> =
         found.iter().enumerate().flat_map(|(i, f)| f.modes.iter().map(move |mode| (i, mode))).collect();
     let [sign, above, multiplicity, residual] =

@@ -3,7 +3,7 @@
 use super::block::{self, Answers, At, Codes, Operation, Pieces, Rows};
 use super::checks::{SINGULAR_PIVOTS, actuated, finite, limit_status, pose_at, with_twist, within_limits};
 use super::dynamics::Loads;
-use super::{FieldId, Table};
+use super::{FieldId, Table, redundant};
 use crate::coordinates::Set;
 use crate::forward_dynamics::{self, Equations};
 use crate::lanes::Lanes;
@@ -31,6 +31,9 @@ pub fn forward_dynamics(
     loads: &Loads,
 ) -> Table {
     let fields = [("acceleration", vec![6]), ("constraint", vec![mech.independent.len()])];
+    if mech.is_redundant() {
+        return redundant::forward_dynamics(mech, poses, twists, forces, loads, fields);
+    }
     let operation = ForwardDynamics { mech, poses, twists, forces, loads };
     block::table(&operation, poses.len() / 16, fields)
 }

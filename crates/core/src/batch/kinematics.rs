@@ -4,7 +4,7 @@ use super::block::{self, Answers, At, Codes, Operation};
 use super::checks::{
     actuated, any_pose, finite, kept, pose_at, solved, with_leg, with_motion, with_twist, within_limits_of,
 };
-use super::{States, Table};
+use super::{States, Table, redundant};
 use crate::jacobian;
 use crate::joints::{self, Zero};
 use crate::lanes::Lanes;
@@ -49,6 +49,9 @@ impl Operation<3> for InverseKinematics<'_> {
 /// J for each pose, constraint satisfied or not [Eq. 13].
 #[must_use]
 pub fn jacobians(mech: &Mechanism, poses: &[f64]) -> Table {
+    if mech.is_redundant() {
+        return redundant::jacobians(mech, poses);
+    }
     block::table(&Jacobians { mech, poses }, poses.len() / 16, [("jacobian", vec![6, 6])])
 }
 
@@ -73,6 +76,9 @@ impl Operation<1> for Jacobians<'_> {
 /// H for each pose, constraint satisfied or not [Eq. 19].
 #[must_use]
 pub fn hessians(mech: &Mechanism, poses: &[f64]) -> Table {
+    if mech.is_redundant() {
+        return redundant::hessians(mech, poses);
+    }
     block::table(&Hessians { mech, poses }, poses.len() / 16, [("hessian", vec![6, 6, 6])])
 }
 
@@ -203,6 +209,9 @@ impl Operation<21> for Kinematics<'_> {
 /// The platform's twist from the rates of all legs; those of passive legs are not read [Eq. 13].
 #[must_use]
 pub fn platform_twist(mech: &Mechanism, poses: &[f64], rates: &[f64]) -> Table {
+    if mech.is_redundant() {
+        return redundant::platform_twist(mech, poses, rates);
+    }
     block::table(&PlatformTwist { mech, poses, rates }, poses.len() / 16, [("twist", vec![6])])
 }
 
@@ -232,6 +241,9 @@ pub fn platform_acceleration(
     twists: &[f64],
     accelerations: &[f64],
 ) -> Table {
+    if mech.is_redundant() {
+        return redundant::platform_acceleration(mech, poses, twists, accelerations);
+    }
     let operation = PlatformAcceleration { mech, poses, twists, accelerations };
     block::table(&operation, poses.len() / 16, [("acceleration", vec![6])])
 }

@@ -3,7 +3,7 @@
 use super::block::{self, Answers, At, Codes, Operation};
 use super::checks::solved;
 use super::dynamics::Loads;
-use super::{States, Table};
+use super::{States, Table, redundant};
 use crate::dynamics;
 use crate::lanes::Lanes;
 use crate::limits::{Binding, Measure, Seen};
@@ -18,6 +18,9 @@ pub fn limits(mech: &Mechanism, states: &States, loads: &Loads) -> Table {
     let count = mech.limits.len();
     let fields =
         [("margins", vec![count]), ("relative", vec![count]), ("binding", vec![]), ("within", vec![])];
+    if mech.is_redundant() {
+        return redundant::limits(mech, states, loads, fields);
+    }
     let forces = mech.limits.iter().any(|limit| matches!(limit.measure, Measure::Force { .. }));
     block::table(&Limits { mech, states, loads, forces }, states.len(), fields)
 }

@@ -1,0 +1,152 @@
+//! Forward kinematics where lengths are not six equations with one solution nearby: legs that contradict one another unless
+//! they agree \[T70\], and designs that are singular at every pose. By Gauss and Newton's method, with the rows themselves.
+
+use nalgebra::{DMatrix, DVector};
+
+use crate::constraint;
+use crate::forward::{FOLD_PIVOTS, Found, LONGEST_STEP, SMALL_STEP, step_of};
+use crate::leg;
+use crate::mechanism::Mechanism;
+use crate::mobility::RANK_TOLERANCE;
+use crate::redundant::pure_rows;
+use crate::spatial::Pose;
+use crate::status::Status;
+use crate::svd::Svd;
+
+/// Steps after which the iteration is given up.
+const STEPS: u32 = 200;
+
+/// Largest error of a length, relative to the characteristic length, of a pose that has the lengths: as much as poses may miss
+/// their constraints by.
+const AGREEMENT: f64 = 1e-6;
+
+/// The same of a constraint.
+const KEPT: f64 = 1e-11;
+
+/// Steps below this size are made whatever they do: the iteration contracts there, to rounding if the legs agree.
+const NEAR: f64 = 1e-6;
+
+/// Size of a step that is rounding.
+const ROUNDING: f64 = 1e-14;
+
+/// Share of a step below which there is no way nearer.
+const SMALLEST_SHARE: f64 = 1e-7;
+
+/// Whether forward kinematics is sought here.
+#[must_use]
+pub fn serves(mech: &Mechanism) -> bool {
+    mech.is_redundant() || mech.mobility.uncontrolled > 0
+}
+
+/// What a pose misses, in pure numbers, and the step that takes most of it off.
+struct Misses {
+    legs: DVector<f64>,
+    others: DVector<f64>,
+    /// (v/Λ, ω), and its size.
+    step: [f64; 6],
+    size: f64,
+    /// What is left of the square of all that is missed, if rows stay as they are.
+    left: f64,
+    /// Least to greatest singular value of the legs' rows on what the others allow.
+    pivots: f64,
+}
+
+impl Misses {
+    fn at(mech: &Mechanism, lengths: &[f64], pose: &Pose<f64>) -> Option<Self> {
+        let scale = mech.characteristic_length;
+        let (rows, n) = (pure_rows(mech, pose, scale), lengths.len());
+        let short =
+            mech.actuated().zip(lengths).map(|((_, leg), asked)| leg::position(leg, pose).length - asked);
+        let idle = mech.idle.iter().map(|_| 0.0);
+        let off = mech.independent.iter().map(|c| constraint::value(c, pose) * constraint::length(c, scale));
+        let legs = DVector::from_iterator(n, short) / scale;
+        let others = DVector::from_iterator(rows.len() - n, idle.chain(off)) / scale;
+        let of_legs = DMatrix::from_fn(n, 6, |i, j| rows[i][j]);
+        // First what the others ask for, then what the legs ask for within that; each of least size.
+        let held = Svd::of(&DMatrix::from_fn(others.len(), 6, |i, j| rows[n + i][j]))?;
+        let (first, rank) = least(&held, &others);
+        let allowed = held.v_t.rows(rank, 6 - rank).transpose();
+        let on_allowed = Svd::of(&(&of_legs * &allowed))?;
+        let (second, _) = least(&on_allowed, &(&legs + &of_legs * &first));
+        let step = first + allowed * second;
+        let left = (&legs + &of_legs * &step).norm_squared();
+        let last = on_allowed.values.len().checked_sub(1)?;
+        let pivots = on_allowed.values[last] / on_allowed.values[0];
+        let size = step.norm();
+        let step = std::array::from_fn(|i| step[i]);
+        size.is_finite().then_some(Misses { legs, others, step, size, left, pivots })
+    }
+
+    fn square(&self) -> f64 {
+        self.legs.norm_squared() + self.others.norm_squared()
+    }
+}
+
+/// The least x for which `m x = -b` in the sense of least squares, and the rank of m.
+fn least(m: &Svd, b: &DVector<f64>) -> (DVector<f64>, usize) {
+    let rank = m.rank(RANK_TOLERANCE);
+    let mut x = DVector::zeros(m.v_t.ncols());
+    for k in 0..rank {
+        x -= m.v_t.row(k).transpose() * (m.u.column(k).dot(b) / m.values[k]);
+    }
+    (x, rank)
+}
+
+/// A pose near the guess with the given lengths of all actuated legs. Where the nearest one does not have them, they contradict
+/// one another, and the status says so.
+#[must_use]
+pub fn forward_kinematics(mech: &Mechanism, lengths: &[f64], guess: &Pose<f64>) -> Found {
+    let nothing = Found {
+        pose: *guess,
+        residual: f64::NAN,
+        iterations: 0,
+        sign: f64::NAN,
+        status: Status::InvalidInput,
+    };
+    if !lengths.iter().all(|l| *l >= 0.0 && l.is_finite()) {
+        return nothing;
+    }
+    let lost = Found { status: Status::NotConverged, ..nothing };
+    let Some(mut at) = Misses::at(mech, lengths, guess) else { return lost };
+    let (mut pose, mut share, mut iterations) = (*guess, 1.0_f64, 0);
+    while at.size > ROUNDING && iterations < STEPS {
+        iterations += 1;
+        share = share.min(LONGEST_STEP / at.size);
+        let next = pose.stepped(&step_of(mech, at.step, share));
+        let trial = Misses::at(mech, lengths, &next);
+        let near = at.size <= NEAR;
+        let promised = 0.1 * share * (at.square() - at.left).max(0.0);
+        match trial {
+            Some(trial) if near || trial.square() <= at.square() - promised => {
+                // Rounding shrinks no further.
+                let done = near && trial.size >= 0.5 * at.size;
+                (pose, at, share) = (next, trial, (2.0 * share).min(1.0));
+                if done {
+                    break;
+                }
+            }
+            _ => share *= 0.25,
+        }
+        if share <= SMALLEST_SHARE {
+            break;
+        }
+    }
+    let met = at.legs.amax() <= AGREEMENT && at.others.iter().all(|x| x.abs() <= KEPT);
+    let status = match (met, at.size <= SMALL_STEP) {
+        (true, _) if mech.mobility.uncontrolled > 0 || !(at.pivots > FOLD_PIVOTS) => Status::Singular,
+        (true, _) => Status::Ok,
+        (false, true) => Status::Inconsistent,
+        (false, false) => Status::NotConverged,
+    };
+    let sign = if mech.mobility.uncontrolled > 0 { 0.0 } else { 1.0 };
+    let residual = error(mech, lengths, &pose);
+    Found { pose, residual, iterations, sign, status }
+}
+
+/// The largest error of a length or of a constraint, m.
+#[must_use]
+pub fn error(mech: &Mechanism, lengths: &[f64], pose: &Pose<f64>) -> f64 {
+    let legs =
+        mech.actuated().zip(lengths).map(|((_, leg), asked)| (leg::position(leg, pose).length - asked).abs());
+    legs.fold(constraint::largest_distance(mech, pose), |m, e| if e > m || e.is_nan() { e } else { m })
+}
