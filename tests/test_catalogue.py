@@ -52,6 +52,7 @@ class Known(NamedTuple):
 
 
 GENERAL = "six legs without constraints"
+ROD = "six, of which five legs on a rod leave its spin: Borràs, Thomas, Torras 2010"
 LEAST = "one constraint of the leg that is not SPS or UPS"
 KNOWN = {
     "2rpu-spr": Known(3, "2R1T: Rotational axes analysis of the 2-RPU/SPR 2R1T parallel mechanism"),
@@ -61,16 +62,21 @@ KNOWN = {
     "3-spr": Known(3, "kinematic inversion of 3-rps, so with its solutions", 16),
     "3-upu": Known(3, "three translations: Tsai 1996"),
     "3-upu-snu": Known(3, "three translations but at singular poses: Zlatanov, Bonev, Gosselin 2002"),
+    "4-rpr": Known(3, "as 3-rpr"),
     "4sps-spr": Known(5, LEAST),
     "4sps-upu": Known(5, LEAST),
+    "4ups-up": Known(3, "as tricept"),
     "4ups-upu": Known(5, LEAST),
     "dietmaier-6-sps": Known(6, GENERAL, 40),
     "exechon": Known(3, "two tilts and a translation: Neumann's patent"),
     "griffis-duffy": Known(6, "six, of which the legs control five: Husty, Karger 2000"),
     "linuxcnc-6-3": Known(6, GENERAL, 16),
+    "linuxcnc-pentakins": Known(6, ROD),
     "lu-3spu-2rpu-r": Known(5, "Lu, Liu, Zhang, Ye, Wang: Eq. 1"),
     "lu-3spu-2rpu-r-turned": Known(5, "as lu-3spu-2rpu-r: the same joints"),
     "octahedral-3-3": Known(6, GENERAL, 16),
+    "pentapod-5-spu": Known(6, ROD),
+    "pentapod-5-ups": Known(6, ROD),
     "tricept": Known(3, "two tilts and a sliding: Neumann's patent"),
     "tsai-6-sps": Known(6, GENERAL),
     "ups-hexapod": Known(6, GENERAL),
@@ -80,6 +86,7 @@ OVERCONSTRAINED = {
     "2rpu-spr": 2,
     "2upr-rpu": 3,
     "3-rpr": 6,
+    "4-rpr": 9,
     "exechon": 2,
     "lu-3spu-2rpu-r": 2,
     "lu-3spu-2rpu-r-turned": 2,
@@ -88,6 +95,10 @@ OVERCONSTRAINED = {
 
 SINGULAR = ("griffis-duffy",)
 """Singular at every pose."""
+IDLE = ("linuxcnc-pentakins", "pentapod-5-spu", "pentapod-5-ups")
+"""With a freedom that no leg feels."""
+REDUNDANT = ("4-rpr", "4ups-up")
+"""With one actuator more than it takes."""
 STARTS = {
     "3-upu-snu": {"x": 0.06, "y": 0.06, "z": 0.45},
     "lu-3spu-2rpu-r": {"alpha": 0.1, "p": -0.3, "h": 0.6, "beta": 0.8, "gamma": 0.6},
@@ -142,6 +153,9 @@ def test_mobility_is_that_of_the_literature(name: str) -> None:
     assert mech.name == name
     assert (mech.dof, mobility.redundant) == (KNOWN[name].dof, OVERCONSTRAINED.get(name, 0))
     assert mobility.uncontrolled == (name in SINGULAR)
+    assert len(mobility.idle) == (name in IDLE)
+    assert mech.actuated.sum() == mech.dof - (name in IDLE) + (name in REDUNDANT)
+    assert mech.n_rows == 6 + (name in REDUNDANT)
     assert mobility.passive == sum(letters == "SPS" for letters in mech.leg_letters)
     # Kutzbach: 6 (n - k - 1) + ΣM_i + ς - M_0
     terms = 6 * (mobility.links - mobility.joints - 1) + mobility.joint_freedoms
@@ -160,6 +174,9 @@ def test_forward_kinematics_returns_to_the_pose(name: str) -> None:
     found = mech.forward_kinematics(lengths, beside(mech, pose))
     assert set(found.status.tolist()) == {Status.OK}
     assert apart(mech, found.pose, pose).max() < POSE
+    if name in REDUNDANT:
+        lengths[:, np.flatnonzero(mech.actuated)[0]] += 0.01 * mech.characteristic_length
+        assert set(mech.forward_kinematics(lengths, pose).status.tolist()) == {Status.INCONSISTENT}
 
 
 @pytest.mark.parametrize("name", REGULAR)
@@ -189,11 +206,11 @@ def test_jacobian_and_hessian_give_rates_and_accelerations(name: str) -> None:
     J, H = mech.jacobian(pose), mech.hessian(pose)
     rates = np.einsum("nij,nj->ni", J, twist)
     accelerations = np.einsum("nij,nj->ni", J, acceleration) + np.einsum("nijk,nj,nk->ni", H, twist, twist)
-    k = int(mech.actuated.sum())
+    k, idle = int(mech.actuated.sum()), int(name in IDLE)
     for found, given in ((rates, motion.rates), (accelerations, motion.accelerations)):
         scale = abs(given).max()
         assert abs(found[:, :k] - given[:, mech.actuated]).max() < IDENTITY * scale
-        assert abs(found[:, k:]).max(initial=0.0) < IDENTITY * max(scale, 1.0)
+        assert abs(found[:, k + idle :]).max(initial=0.0) < IDENTITY * max(scale, 1.0)
 
 
 def beside(mech: pp.Mechanism, pose: Array) -> Array:
@@ -205,7 +222,10 @@ def beside(mech: pp.Mechanism, pose: Array) -> Array:
 
 
 def apart(mech: pp.Mechanism, a: Array, b: Array) -> Array:
-    """(...): largest difference of entries, positions by the characteristic length."""
+    """(...): largest difference of entries, positions by the characteristic length; of an idle line, if any."""
+    for idle in mech.mobility().idle:
+        a, b = (np.concatenate([p @ [*idle.point, 1.0], p @ [*idle.axis, 0.0]], axis=-1) for p in (a, b))
+        return abs(a - b).max(axis=-1) / min(1.0, mech.characteristic_length)
     scale = np.ones((4, 4))
     scale[:3, 3] = mech.characteristic_length
     return abs((a - b) / scale).max(axis=(-1, -2))
@@ -255,13 +275,17 @@ def test_griffis_duffy_is_singular_everywhere() -> None:
         mech.base_parameters()
 
 
-@pytest.mark.xfail(strict=True, reason="forward kinematics says NOT_CONVERGED away from the guess")
 def test_forward_kinematics_of_griffis_duffy_names_the_singularity() -> None:
     """From a guess beside the pose: the lengths leave a curve of poses, whichever of them is found."""
     mech = load("griffis-duffy")
     pose, *_ = sampled("griffis-duffy")
     found = mech.forward_kinematics(mech.inverse_kinematics(pose).lengths, beside(mech, pose))
     assert set(found.status.tolist()) == {Status.SINGULAR}
+    lengths = mech.inverse_kinematics(pose).lengths
+    assert abs(mech.inverse_kinematics(found.pose).lengths - lengths).max() < 1e-12
+    # Only five lengths are free.
+    lengths[:, 0] += 0.01
+    assert set(mech.forward_kinematics(lengths, pose).status.tolist()) == {Status.INCONSISTENT}
 
 
 def test_snu_is_loose_at_its_centre() -> None:

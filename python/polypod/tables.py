@@ -77,6 +77,8 @@ def mobility_table(facts: Facts) -> Table:
         ("redundant constraints", "redundant", _of_legs("couple", mobility["redundant_legs"])),
         ("passive freedoms", "passive", _of_legs("spin of", mobility["passive_legs"])),
     )
+    if mobility["rows"] > 6:
+        terms = (*terms, ("rows of the Jacobian", "rows", "more actuators than it takes: forces are a choice"))
     rows = [(term, str(mobility[key]), remark) for term, key, remark in terms]
     return Table("Mobility, from ranks at generic poses", ("", ">", ""), rows)
 

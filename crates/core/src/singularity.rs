@@ -188,8 +188,17 @@ const DETERMINANT_ROUNDING: f64 = 4e-15;
 #[inline(always)]
 pub fn determinant<V: Ordered>(mech: &Mechanism, pose: &Pose<V>, twist: &Twist<V>, scale: f64) -> Dual<V> {
     let moving = pose.along(twist);
-    let rows =
-        if mech.is_redundant() { gram(mech, &moving, scale) } else { pure_jacobian(mech, &moving, scale) };
+    if mech.is_redundant() {
+        let square = gram(mech, &moving, scale);
+        let (det, mut trace) = (linear::determinant(&square), V::zero());
+        for i in 0..6 {
+            trace = trace + square[i][i].x.scale(1.0 / 6.0);
+        }
+        // The mean to the sixth is the most that it can be; sums of products round by parts of the largest.
+        let cube = trace * trace * trace;
+        return rounded(det, cube * cube);
+    }
+    let rows = pure_jacobian(mech, &moving, scale);
     let (det, mut size) = (linear::determinant(&rows), V::one());
     for i in 0..6 {
         let mut square = V::zero();
@@ -198,6 +207,12 @@ pub fn determinant<V: Ordered>(mech: &Mechanism, pose: &Pose<V>, twist: &Twist<V
         }
         size = size * square.sqrt();
     }
+    rounded(det, size)
+}
+
+/// Zero where a determinant is rounding of that, beside the given size.
+#[inline(always)]
+fn rounded<V: Ordered>(det: Dual<V>, size: V) -> Dual<V> {
     let nothing = det.x.abs().at_most(size.scale(DETERMINANT_ROUNDING));
     Dual::new(V::select(nothing, V::zero(), det.x), det.d)
 }
