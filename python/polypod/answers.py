@@ -259,7 +259,7 @@ class InverseDynamics(Answer):
     """(..., k): multipliers of the independent constraints, N, of kind D N m; for the paper's machine f_c."""
     idle_torques: Array
     """(..., idle freedoms): torques about their lines on the platform that the motion needs and no leg gives,
-    N m, such as a spindle's motor [T67]; in the order of `Mobility.idle`."""
+    N m, such as a spindle's motor [T70]; in the order of `Mobility.idle`."""
     status: Codes
     """(...): `Status` of each state."""
 
@@ -576,7 +576,7 @@ class Published:
 
 @dataclass(frozen=True)
 class IdleFreedom:
-    """A turn of the platform that no leg feels at any pose, as the spin of a rod that all legs end on [T67]."""
+    """A turn of the platform that no leg feels at any pose, as the spin of a rod that all legs end on [T70]."""
 
     body: str
     """What the line is fixed in: "platform" or "base"."""
@@ -620,7 +620,7 @@ class Mobility:
     """Freedoms, idle ones apart, that remain at generic poses with all actuators locked: zero unless the design
     is singular."""
     idle: tuple[IdleFreedom, ...]
-    """Freedoms that no leg feels, by design [T67]."""
+    """Freedoms that no leg feels, by design [T70]."""
     constraint_rows: tuple[tuple[str, str], ...]
     """Leg and kind (A-E) of every scalar constraint."""
     independent_rows: tuple[int, ...]

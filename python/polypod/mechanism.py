@@ -429,7 +429,7 @@ class Mechanism:
         others are in m. For any pose (..., 4, 4), on the constraints or not.
 
         Idle freedoms have rows (0, u) between those of legs and constraints, with the spin ω·u for a rate
-        [T67]. With redundant actuators J is (..., n_rows, 6) [T69].
+        [T70]. With redundant actuators J is (..., n_rows, 6) [T72].
         """
         (poses,) = POSE(pose)
         return self._core.jacobian(poses)["jacobian"]
@@ -465,7 +465,7 @@ class Mechanism:
             rates: of the legs, (..., n), m/s; those of passive legs are not read.
 
         Idle freedoms do not spin. Rates of redundant actuators must agree to 1e-6 of their size; else the
-        status is INCONSISTENT and there is no twist [T70].
+        status is INCONSISTENT and there is no twist [T73].
         """
         arrays = self._rates(pose, rates)
         return PlatformTwist(self, **self._core.platform_twist(*arrays))
@@ -502,7 +502,7 @@ class Mechanism:
         """Determinant of J in pure numbers, and its exact rate along a twist [T30].
 
         With redundant actuators J has none: it is that of JᵀJ, which has no sign and is zero where J loses its
-        rank [T69].
+        rank [T72].
 
         Args:
             pose: (..., 4, 4).
@@ -655,9 +655,9 @@ class Mechanism:
         SINGULAR where two modes meet, so that the pose is known to about 1e-7 only. Lengths that are negative
         or not finite give INVALID_INPUT.
 
-        Idle freedoms keep the spin of the guess [T67]. Lengths of redundant actuators must agree: the pose has
+        Idle freedoms keep the spin of the guess [T70]. Lengths of redundant actuators must agree: the pose has
         all of them, to 1e-6 of the characteristic length, or the status is INCONSISTENT and there is none,
-        only the `residual` of the nearest [T70]; there are no modes to jump between. A design that is singular
+        only the `residual` of the nearest [T73]; there are no modes to jump between. A design that is singular
         at every pose has a curve of poses for the lengths that it can have at all: the status is SINGULAR with
         one of them, INCONSISTENT for lengths that it cannot have.
 
@@ -683,8 +683,8 @@ class Mechanism:
 
         The first call for a mechanism finds all complex solutions for generic lengths, which takes some
         tenths of a second. With an idle freedom a mode stands for all spins: its pose has the one that is
-        the shortest turn from home [T67]. Of redundant actuators all lengths are met; INCONSISTENT tells that
-        no pose has them all [T70].
+        the shortest turn from home [T70]. Of redundant actuators all lengths are met; INCONSISTENT tells that
+        no pose has them all [T73].
 
         Raises:
             UnsupportedError: singular by design, or several idle freedoms.
@@ -853,7 +853,7 @@ class Mechanism:
             wrench_axes: the axes of `wrench`, "base" or "platform".
             preferred: active forces (n,) or (..., n), N, that redundant actuators should have as nearly as the
                 balance lets them, such as a preload; those of passive legs are not read. The answer is the
-                nearest in the sense of least squares; without it the least one [T69]. Where forces are
+                nearest in the sense of least squares; without it the least one [T72]. Where forces are
                 determined it has no effect.
 
         >>> import numpy as np, polypod as pp

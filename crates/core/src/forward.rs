@@ -66,7 +66,7 @@ pub fn system<T: Real>(mech: &Mechanism, pose: &Pose<T>, squares: &[T; 6]) -> Sy
         count += 1;
     }
     for idle in &mech.idle {
-        // No step spins \[T68\].
+        // No step spins \[T71\].
         system.put(count, scale, T::zero(), idle::row(idle, pose), 1.0);
         count += 1;
     }

@@ -1,5 +1,5 @@
 //! Idle freedoms: turns of the platform about a line fixed in it, or in the base, that no leg feels at any pose, as the spin of
-//! a rod that all legs end on \[T67\]. Found from ranks, like all freedoms.
+//! a rod that all legs end on \[T70\]. Found from ranks, like all freedoms.
 
 use nalgebra::DMatrix;
 use serde::Serialize;

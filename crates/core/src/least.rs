@@ -1,5 +1,5 @@
 //! Forward kinematics where lengths are not six equations with one solution nearby: legs that contradict one another unless
-//! they agree \[T70\], and designs that are singular at every pose. By Gauss and Newton's method, with the rows themselves.
+//! they agree \[T73\], and designs that are singular at every pose. By Gauss and Newton's method, with the rows themselves.
 
 use nalgebra::{DMatrix, DVector};
 

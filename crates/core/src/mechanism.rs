@@ -182,7 +182,7 @@ pub struct Mobility {
     /// Freedoms, idle ones apart, that remain at generic poses when all actuators are locked: zero unless the design itself
     /// is singular.
     pub uncontrolled: usize,
-    /// Freedoms that no leg feels by design: turns about lines of the platform or of the base \[T67\].
+    /// Freedoms that no leg feels by design: turns about lines of the platform or of the base \[T70\].
     pub idle: Vec<IdleRow>,
     /// Scalar constraints of the legs: leg (from 0) and kind, and whether it is one of the independent ones.
     pub constraints: Vec<ConstraintRow>,
@@ -214,7 +214,7 @@ pub struct Mechanism<S = f64> {
     pub constraints: Vec<Constraint<S>>,
     /// Those of them that are independent at generic poses, in the order of the legs.
     pub independent: Vec<Constraint<S>>,
-    /// Freedoms that no leg feels, each with a row of its own in the Jacobian, between those of legs and constraints \[T67\].
+    /// Freedoms that no leg feels, each with a row of its own in the Jacobian, between those of legs and constraints \[T70\].
     pub idle: Vec<Idle<S>>,
     /// Root mean square distance of the platform joints from o: what lengths are scaled by, m.
     pub characteristic_length: f64,
@@ -238,7 +238,7 @@ impl<S> Mechanism<S> {
         self.actuated().count() + self.idle.len() + self.independent.len()
     }
 
-    /// Whether more legs are actuated than it takes: the Jacobian then has more rows than columns \[T69\].
+    /// Whether more legs are actuated than it takes: the Jacobian then has more rows than columns \[T72\].
     #[must_use]
     pub fn is_redundant(&self) -> bool {
         self.rows() > 6

@@ -252,7 +252,7 @@ fn norm(x: &[C; 6]) -> f64 {
     x.iter().map(|z| z.norm_sqr()).sum::<f64>().sqrt()
 }
 
-/// Distance of two poses as a pure number, idle spins apart \[T68\]: of the columns of R, and of the points o in characteristic lengths, relative
+/// Distance of two poses as a pure number, idle spins apart \[T71\]: of the columns of R, and of the points o in characteristic lengths, relative
 /// to how far off o is. Complex rotations may be large; `RᵀR = 1` then holds and tells them apart only to the square of
 /// their size, by which the distance is divided.
 fn distance(mech: &Mechanism, a: &Pose<C>, b: &Pose<C>) -> f64 {
@@ -274,7 +274,7 @@ fn line<T: Real>(idle: &Idle, pose: &Pose<T>) -> (Vec3<T>, Vec3<T>) {
     }
 }
 
-/// The same distance of what an idle spin leaves: of the line \[T68\].
+/// The same distance of what an idle spin leaves: of the line \[T71\].
 fn distance_of_lines(mech: &Mechanism, idle: &Idle, a: &Pose<C>, b: &Pose<C>) -> f64 {
     let ((u, p), (v, q)) = (line(idle, a), line(idle, b));
     let size = modulus(u).max(1.0);
@@ -330,7 +330,7 @@ pub struct Modes {
 }
 
 /// Every real pose with the given lengths of all actuated legs; passive ones are not read. Where legs are redundant, those of
-/// the square mechanism that meet the others as well \[T70\].
+/// the square mechanism that meet the others as well \[T73\].
 #[must_use]
 pub fn assembly_modes_of_all(mech: &Mechanism, start: &Start, lengths: &[f64]) -> Modes {
     let of = |mech: &Mechanism| -> Vec<f64> { mech.actuated().map(|(k, _)| lengths[k]).collect() };

@@ -1,4 +1,4 @@
-//! Mechanisms with more actuated legs than it takes: the Jacobian has more rows than columns \[T69\]-\[T71\].
+//! Mechanisms with more actuated legs than it takes: the Jacobian has more rows than columns \[T72\]-\[T74\].
 //!
 //! All is solved by singular values of the rows themselves; products of rows, which would square their condition number,
 //! are never formed. One state at a time.
@@ -104,7 +104,7 @@ impl Parted {
     }
 
     /// Solves, with the rows `A` of the legs and `C` of all others, `f - A y = preferred`, `Aᵀ f + Cᵀ λ = w`, `C y = rates`:
-    /// the forces nearest to the preferred ones that balance -w \[T69\]. All in SI.
+    /// the forces nearest to the preferred ones that balance -w \[T72\]. All in SI.
     pub(crate) fn solve(&self, preferred: &[f64], w: Wrench<f64>, rates: &[f64]) -> Balanced {
         let (n, held) = (self.legs.nrows(), self.units.len());
         let pure = Wrench::new(w.force, w.torque * (1.0 / self.scale)).array();
@@ -152,7 +152,7 @@ impl Parted {
         (held - idle..6).map(|k| Wrench::from_array(std::array::from_fn(|i| svd.v_t[(k, i)]))).collect()
     }
 
-    /// What balances a wrench with least forces: active forces and multipliers, in the order of the rows \[T69\].
+    /// What balances a wrench with least forces: active forces and multipliers, in the order of the rows \[T72\].
     pub(crate) fn answer(&self, w: Wrench<f64>) -> Vec<f64> {
         let Balanced { mut forces, multipliers, .. } = self.solve(&[], w * -1.0, &[]);
         forces.extend(multipliers);
@@ -172,7 +172,7 @@ pub struct Forces {
 }
 
 /// The active forces nearest to preferred ones (none for zero) in the sense of least squares, and the multipliers
-/// [Eq. 43] \[T69\].
+/// [Eq. 43] \[T72\].
 #[must_use]
 pub fn inverse_dynamics(
     mech: &Mechanism,
@@ -203,7 +203,7 @@ pub struct Followed {
     pub agrees: bool,
 }
 
-/// The platform's twist from the rates of the actuated legs, in the sense of least squares \[T70\]; those of idle freedoms may
+/// The platform's twist from the rates of the actuated legs, in the sense of least squares \[T73\]; those of idle freedoms may
 /// follow, else they do not spin.
 #[must_use]
 pub fn platform_twist(mech: &Mechanism, pose: &Pose<f64>, rates: &[f64]) -> Followed {
@@ -211,7 +211,7 @@ pub fn platform_twist(mech: &Mechanism, pose: &Pose<f64>, rates: &[f64]) -> Foll
     follow(mech, pose, legs, idle, norm(legs))
 }
 
-/// The platform's acceleration from those of the actuated legs \[T70\]; those of idle freedoms may follow.
+/// The platform's acceleration from those of the actuated legs \[T73\]; those of idle freedoms may follow.
 #[must_use]
 pub fn platform_acceleration(
     mech: &Mechanism,
@@ -295,7 +295,7 @@ pub(crate) struct Solved {
 pub(crate) type Column = Vec<f64>;
 
 /// Derivatives of the least active forces and of the multipliers by the motion in each direction, the other numbers kept: what
-/// the three parts of the balance are off by, the forces answer \[T71\].
+/// the three parts of the balance are off by, the forces answer \[T74\].
 pub(crate) fn by_motion(mech: &Mechanism, still: &Varied, at: &Solved) -> Vec<Column> {
     let direction = |k: usize| {
         let mut step = [0.0; DIRECTIONS];
@@ -339,7 +339,7 @@ fn answered(
 }
 
 /// Derivatives of the least active forces, of multipliers and of the lengths of all legs by a number of the geometry, the given
-/// coordinates, their rates and second rates kept \[T71\].
+/// coordinates, their rates and second rates kept \[T74\].
 pub(crate) fn by_geometry(
     varied: &Varied,
     at: &Solved,

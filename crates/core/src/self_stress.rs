@@ -348,7 +348,7 @@ impl<'a, V: Lanes> Solver<'a, V> {
 }
 
 impl Solver<'_, f64> {
-    /// The same where actuators are redundant: with their least forces \[T69\], which leave the platform's freedoms nothing to
+    /// The same where actuators are redundant: with their least forces \[T72\], which leave the platform's freedoms nothing to
     /// hold. What the props hold shows as an error.
     pub(crate) fn solve_redundant(&mut self, platform: &Motion<f64>, load: Wrench<f64>) -> bool {
         let (mech, pose) = (self.mech, &platform.pose);

@@ -153,7 +153,7 @@ pub(crate) fn idle_row<T: Real>(idle: &Idle, pose: &Pose<T>, scale: f64) -> [T; 
     pure_row(idle::row(idle, pose) * T::lit(scale), scale)
 }
 
-/// JᵀJ in pure numbers, of any number of rows \[T69\].
+/// JᵀJ in pure numbers, of any number of rows \[T72\].
 #[inline(always)]
 fn gram<T: Real>(mech: &Mechanism, pose: &Pose<T>, scale: f64) -> Matrix6<T> {
     let mut sum = [[T::zero(); 6]; 6];
@@ -183,7 +183,7 @@ fn add_square<T: Real>(sum: &mut Matrix6<T>, row: &[T; 6]) {
 /// What rounding leaves of a determinant that is zero, relative to the product of its rows' sizes.
 const DETERMINANT_ROUNDING: f64 = 4e-15;
 
-/// det J, zero within rounding, and its exact rate along a twist \[T30\]; det JᵀJ where J has more rows than columns \[T69\].
+/// det J, zero within rounding, and its exact rate along a twist \[T30\]; det JᵀJ where J has more rows than columns \[T72\].
 #[must_use]
 #[inline(always)]
 pub fn determinant<V: Ordered>(mech: &Mechanism, pose: &Pose<V>, twist: &Twist<V>, scale: f64) -> Dual<V> {
@@ -255,7 +255,7 @@ fn allowed(mech: &Mechanism, pose: &Pose<f64>, scale: f64, tolerance: f64) -> Al
     }
 }
 
-/// The part of a basis of twists (v, Λω) that is square to the idle ones, which no leg is there to control \[T67\].
+/// The part of a basis of twists (v, Λω) that is square to the idle ones, which no leg is there to control \[T70\].
 fn without_idle(mech: &Mechanism, pose: &Pose<f64>, scale: f64, basis: DMatrix<f64>) -> DMatrix<f64> {
     if mech.idle.is_empty() {
         return basis;

@@ -43,7 +43,7 @@ impl Loads<'_> {
 }
 
 /// Active forces of all legs (zero for passive ones), multipliers of the independent constraints and torques of idle freedoms
-/// [Eq. 43] \[T67\]. Where actuators are redundant, the forces nearest to the preferred ones of all legs, zero for none \[T69\].
+/// [Eq. 43] \[T70\]. Where actuators are redundant, the forces nearest to the preferred ones of all legs, zero for none \[T72\].
 #[must_use]
 pub fn inverse_dynamics(
     mech: &Mechanism,

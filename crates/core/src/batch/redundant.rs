@@ -1,4 +1,4 @@
-//! Mechanisms with redundant actuators at many states, one after the other \[T69\]-\[T71\].
+//! Mechanisms with redundant actuators at many states, one after the other \[T72\]-\[T74\].
 
 use super::block::{self, At, Pieces, Rows};
 use super::checks::{actuated_values, any_pose, finite, limit_status, pose_at, then, with_twist};
@@ -47,7 +47,7 @@ pub(super) fn hessians(mech: &Mechanism, poses: &[f64]) -> Table {
     })
 }
 
-/// The platform's twist from the rates of all legs, as far as they agree \[T70\].
+/// The platform's twist from the rates of all legs, as far as they agree \[T73\].
 pub(super) fn platform_twist(mech: &Mechanism, poses: &[f64], rates: &[f64]) -> Table {
     block::one_by_one(poses.len() / 16, [("twist", vec![6])], Pieces::QUICK, |rows, i| {
         let (pose, codes) = pose_at::<f64>(mech, poses, At::one(i));
@@ -88,7 +88,7 @@ fn put_followed(rows: &mut Rows<'_, 1>, i: usize, found: &Followed) -> Status {
 }
 
 /// Active forces of all legs (zero for passive ones), those nearest to the preferred ones, torques of idle freedoms and
-/// multipliers [Eq. 43] \[T69\].
+/// multipliers [Eq. 43] \[T72\].
 pub(super) fn inverse_dynamics(
     mech: &Mechanism,
     states: &States,
@@ -250,7 +250,7 @@ fn solve(mech: &Mechanism, states: &States, loads: &Loads, i: usize) -> Result<S
     Ok(Solved { platform, load: loads.given(mech, At::one(i)), parted, balanced })
 }
 
-/// Derivatives of the least active forces \[T71\]; fields as of [`super::inverse_dynamics_derivatives`].
+/// Derivatives of the least active forces \[T74\]; fields as of [`super::inverse_dynamics_derivatives`].
 pub(super) fn inverse_dynamics_derivatives(
     mech: &Mechanism,
     states: &States,
@@ -322,7 +322,7 @@ fn columns(mech: &Mechanism, regressor: &Regressor, at: &Solved) -> Vec<Column> 
     (0..regressor.parameters.len()).map(answer).collect()
 }
 
-/// The regressor of the least active forces \[T57\] \[T69\]; fields as of [`super::regressors`].
+/// The regressor of the least active forces \[T57\] \[T72\]; fields as of [`super::regressors`].
 pub(super) fn regressors(
     mech: &Mechanism,
     states: &States,
