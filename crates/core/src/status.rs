@@ -28,10 +28,14 @@ pub enum Status {
     ModeJump = 10,
     /// A revolute joint or a rod turns beyond its range; the numbers stand.
     OutOfAngle = 11,
+    /// The strut of a slider is too short to reach its rail.
+    OutOfReach = 12,
+    /// The pose has the coordinates of its legs, but the strut of a slider leans to the other side; the pose stands.
+    OtherBranch = 13,
 }
 
 impl Status {
-    pub const ALL: [Status; 12] = [
+    pub const ALL: [Status; 14] = [
         Status::Ok,
         Status::NoBranch,
         Status::Fold,
@@ -44,6 +48,8 @@ impl Status {
         Status::OutOfCone,
         Status::ModeJump,
         Status::OutOfAngle,
+        Status::OutOfReach,
+        Status::OtherBranch,
     ];
 
     /// Whether there are numbers all the same: the pose is one, but beyond what the machine can reach.
@@ -93,6 +99,13 @@ impl Status {
             }
             Status::OutOfAngle => {
                 "a revolute joint or a rod turns beyond its range; the numbers stand, the machine cannot reach the pose"
+            }
+            Status::OutOfReach => {
+                "the strut of a slider is too short: from this pose it reaches its rail nowhere"
+            }
+            Status::OtherBranch => {
+                "the pose has the coordinates of its legs, but the strut of a slider leans to the other side of the square to \
+                 its rail than its branch says; give a guess nearer to the pose that is meant"
             }
             Status::InvalidInput => {
                 "the input holds NaN or infinity, or its rotation is not a rotation matrix"
