@@ -130,7 +130,10 @@ class Body(Table):
 
 
 class Link(Table):
-    """Cylinder or piston; `center` may be the distance along the leg from the link's own joint."""
+    """Cylinder, piston or strut; `center` may be the distance along the leg from the link's own joint.
+
+    Of a strut that is the platform joint.
+    """
 
     mass: Number
     center: Center
@@ -156,8 +159,26 @@ class Rod(Table):
     range: Range | None = None
 
 
+class Carriage(Table):
+    """What slides on a rail, without turning; `center` counts from the base joint, in base axes."""
+
+    mass: Number
+    center: Vector = [0.0, 0.0, 0.0]
+
+
+class Slider(Table):
+    """A rail along `axis` through the base point, and a strut of constant length on its carriage.
+
+    `branch` is the sign of the strut's direction along the axis, seen from the carriage.
+    """
+
+    axis: Axis
+    strut: Number
+    branch: Number
+
+
 class Stroke(Table):
-    """Shortest and longest distance from B to b."""
+    """Shortest and longest distance from B to b; of a slider, the ends of its carriage's way on the rail."""
 
     min: Number
     max: Number
@@ -183,10 +204,14 @@ class Joint(Table):
 
 
 class Leg(Table):
-    """Cylinder on the base joint, piston on the platform joint, between them the prismatic one."""
+    """Cylinder on the base joint, piston on the platform joint, between them the prismatic one.
+
+    With `slider`: a carriage on a rail, the base joint on it, and a strut from there to the platform joint.
+    """
 
     name: str | None = None
     actuated: Annotated[bool, Strict()] = True
+    slider: Slider | None = None
     stroke: Stroke | None = None
     radius: Number | None = None
     force: Range | None = None
@@ -194,6 +219,8 @@ class Leg(Table):
     platform: Joint
     cylinder: Link | None = None
     piston: Link | None = None
+    carriage: Carriage | None = None
+    strut: Link | None = None
 
 
 class Limits(Table):
@@ -208,7 +235,7 @@ SECTIONS = ("units", "dynamics", "load", "home", "tool", "limits", "published", 
 
 # Which kind of quantity stands under a key, wherever in the file.
 KIND_OF_KEY = {
-    **dict.fromkeys(("point", "radius", "position", "center", "stroke"), "length"),
+    **dict.fromkeys(("point", "radius", "position", "center", "stroke", "strut"), "length"),
     **dict.fromkeys(("clearance", "joint_reach"), "length"),
     **dict.fromkeys(("angle", "rotation_vector", "range"), "angle"),
     **{kind: kind for kind in ("mass", "inertia", "force", "torque")},
@@ -323,20 +350,46 @@ def _leg(
     leg = read_table(Leg, data, place, faults)
     if leg is None:
         return None
+    if leg.slider is None and isinstance(data, dict) and "slider" in data:
+        return None  # its faults are known, and which links it may have is not
+    for key in _LINKS_OF[leg.slider is None]:
+        if getattr(leg, key) is not None:
+            of = "a telescopic leg (one without slider)" if leg.slider is None else "a slider"
+            own = " and ".join(_LINKS_OF[leg.slider is not None])
+            faults.append(Fault(f"{place}.{key}", f"must not be given; {of} has {own}"))
     base = _joint(leg.base, f"{place}.base", rod_names, units, faults)
     platform = _joint(leg.platform, f"{place}.platform", None, units, faults)
     if base is None or platform is None:
         return None
+    above = leg.piston or leg.strut
     return {
         "name": str(number) if leg.name is None else leg.name,
         "actuated": leg.actuated,
+        "slider": leg.slider and _slider(leg.slider, leg.carriage, units),
         "stroke": leg.stroke and units.vector((leg.stroke.min, leg.stroke.max), "length"),
         "radius": None if leg.radius is None else units.si(leg.radius, "length"),
         "force": _range(leg.force, "force", units),
         "base": base,
         "platform": platform,
         "cylinder": leg.cylinder and _link(leg.cylinder, +1, units),
-        "piston": leg.piston and _link(leg.piston, -1, units),
+        "piston": above and _link(above, -1, units),
+    }
+
+
+_LINKS_OF = {True: ("carriage", "strut"), False: ("cylinder", "piston")}
+"""What a leg has not, by whether it is telescopic."""
+
+
+def _slider(slider: Slider, carriage: Carriage | None, units: Units) -> dict[str, Any]:
+    return {
+        "axis": _axis(slider.axis, units),
+        "strut": units.si(slider.strut, "length"),
+        "branch": float(slider.branch),
+        "carriage": carriage
+        and {
+            "mass": units.si(carriage.mass, "mass"),
+            "center": units.vector(carriage.center, "length"),
+        },
     }
 
 
@@ -425,6 +478,9 @@ _TABLE_OF_KEY: dict[str, type[Table]] = {
     "platform": Joint,
     "cylinder": Link,
     "piston": Link,
+    "strut": Link,
+    "slider": Slider,
+    "carriage": Carriage,
 }
 _FORM_OF_KEY = {
     "point": "[x, y, z] or { radius, angle, z }",

@@ -5,12 +5,14 @@ use crate::constraint;
 use crate::leg;
 use crate::limits;
 use crate::mechanism::{
-    Body, Constraint, ConstraintKind, Joint, Leg, Load, Mechanism, Mobility, Rod, Side, Turning,
+    Body, Constraint, ConstraintKind, Drive, Joint, Leg, Load, Mechanism, Mobility, Rod, Side, Turning,
 };
 use crate::mobility;
 use crate::real::{Constant, Scalar, Trig};
 use crate::spatial::{Mat3, Pose, Vec3, Wrench};
-use crate::spec::{ANGLE_TOLERANCE, BodySpec, Fault, JointKind, JointSpec, LegSpec, RodSpec, Spec};
+use crate::spec::{
+    ANGLE_TOLERANCE, BodySpec, Fault, JointKind, JointSpec, LegSpec, RodSpec, SliderSpec, Spec,
+};
 
 /// How far, relative to the characteristic length, the home pose may miss a constraint.
 const HOME_TOLERANCE: f64 = 1e-6;
@@ -204,7 +206,20 @@ fn check_ends(spec: &Spec) -> Vec<Fault> {
 fn check_leg_at_home(spec: &Spec, place: &str, leg: &LegSpec, home: &Pose<f64>) -> Vec<Fault> {
     let mut faults = Vec::new();
     let e = home.rotation * leg.platform.point;
-    let r = home.o + e - leg.base.point;
+    let mut r = home.o + e - leg.base.point;
+    if let Some(slider) = &leg.slider {
+        if !(slider.axis.norm() > 0.0 && slider.strut > 0.0) {
+            return faults;
+        }
+        faults.extend(check_slider(place, leg, slider));
+        match strut_at_home(slider, r) {
+            Ok(strut) => r = strut,
+            Err(message) => {
+                faults.push(Fault::new(format!("{place}.slider.strut"), message));
+                return faults;
+            }
+        }
+    }
     if r.norm() <= LENGTH_TOLERANCE * (leg.base.point.norm() + e.norm() + home.o.norm()) || r.norm() == 0.0 {
         faults.push(Fault::new(place, "base point and platform point coincide at the home pose"));
         return faults;
@@ -245,6 +260,55 @@ fn check_leg_at_home(spec: &Spec, place: &str, leg: &LegSpec, home: &Pose<f64>) 
                 ),
             ));
         }
+    }
+    faults
+}
+
+/// The strut of a slider at home, from its foot to b; `r` is from the base point.
+fn strut_at_home(slider: &SliderSpec, r: Vec3<f64>) -> Result<Vec3<f64>, String> {
+    let axis = slider.axis.unit();
+    let across = r - axis * r.dot(axis);
+    let (far, strut) = (across.norm(), slider.strut);
+    let ahead = (strut * strut - far * far).sqrt();
+    if !(ahead > ANGLE_TOLERANCE * strut) {
+        return Err(format!(
+            "is {strut} m; the platform point is {far:.6} m from the rail at the home pose, which the strut must exceed: \
+             square to its rail it is singular"
+        ));
+    }
+    Ok(across + axis * (slider.branch * ahead))
+}
+
+/// Joints that a slider can have: those whose constraints do not say where the carriage is.
+fn check_slider(place: &str, leg: &LegSpec, slider: &SliderSpec) -> Vec<Fault> {
+    let mut faults = Vec::new();
+    let axis = slider.axis.unit();
+    let own = leg.base.axis.map_or(axis, Vec3::unit);
+    if leg.base.rod.is_some() {
+        faults.push(Fault::new(format!("{place}.base.rod"), "a rod carries telescopic legs only"));
+        return faults;
+    }
+    let (above, below) = (leg.platform.joint, leg.base.joint);
+    match below {
+        JointKind::Revolute if own.dot(axis).abs() > ANGLE_TOLERANCE => {
+            faults.push(Fault::new(
+                format!("{place}.base.axis"),
+                "must be square to the rail: R on a carriage",
+            ));
+        }
+        JointKind::Fixed => {
+            let message = "is F; the strut must turn on its carriage: give S, U or R";
+            faults.push(Fault::new(format!("{place}.base.joint"), message));
+        }
+        JointKind::Universal if above == JointKind::Universal && own.cross(axis).norm() > ANGLE_TOLERANCE => {
+            let message = "must lie along the rail: U on a carriage, with U on the platform";
+            faults.push(Fault::new(format!("{place}.base.axis"), message));
+        }
+        _ => {}
+    }
+    if matches!(above, JointKind::Revolute | JointKind::Fixed) {
+        let message = format!("is {}; a slider has S or U on the platform", above.letter());
+        faults.push(Fault::new(format!("{place}.platform.joint"), message));
     }
     faults
 }
@@ -296,7 +360,9 @@ fn make_rod(spec: &Spec, index: usize, rod: &RodSpec) -> Rod {
 }
 
 fn make_leg(spec: &LegSpec, rods: &[Rod], home: &Pose<f64>) -> Leg {
-    let delta = (home.o + home.rotation * spec.platform.point - spec.base.point).unit();
+    let r = home.o + home.rotation * spec.platform.point - spec.base.point;
+    let strut = spec.slider.as_ref().and_then(|slider| strut_at_home(slider, r).ok());
+    let delta = strut.unwrap_or(r).unit();
     let rod = spec.base.rod;
     let mut base = make_joint(&spec.base, delta);
     if let Some(rod) = rod {
@@ -308,14 +374,28 @@ fn make_leg(spec: &LegSpec, rods: &[Rod], home: &Pose<f64>) -> Leg {
     Leg {
         name: spec.name.clone(),
         actuated: spec.actuated,
+        drive: spec.slider.as_ref().map_or(Drive::Telescope, |slider| Drive::Slider {
+            rail: slider.axis.unit(),
+            strut: slider.strut,
+            branch: slider.branch,
+        }),
         radius: spec.radius,
         base,
         platform,
         rod,
-        cylinder: make_body(spec.cylinder.as_ref()),
+        cylinder: match &spec.slider {
+            None => make_body(spec.cylinder.as_ref()),
+            Some(slider) => make_carriage(slider),
+        },
         piston: make_body(spec.piston.as_ref()),
         turning,
     }
+}
+
+/// It does not turn: its inertia is of no effect.
+fn make_carriage(slider: &SliderSpec) -> Body {
+    let none = make_body(None);
+    slider.carriage.as_ref().map_or(none.clone(), |c| Body { mass: c.mass, center: c.center, ..none })
 }
 
 fn make_joint(spec: &JointSpec, direction: Vec3<f64>) -> Joint {

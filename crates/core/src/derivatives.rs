@@ -11,7 +11,7 @@ use crate::geometry::{self, Parameter};
 use crate::idle;
 use crate::lanes::Lanes;
 use crate::leg;
-use crate::mechanism::{Leg, Mechanism};
+use crate::mechanism::{Drive, Leg, Mechanism};
 use crate::real::{Constant, Dual, Jet, Real};
 use crate::spatial::{Acceleration, Motion, Pose, Twist, Vec3, Wrench};
 use crate::spec::Axes;
@@ -75,7 +75,7 @@ pub(crate) fn with_leg<S: Constant<Dual<V>>, V: Lanes>(
     let place = leg::place(leg, &varied.pose);
     let mut sum = leg_wrench(mech, index, leg, &place, varied);
     if leg.actuated {
-        sum = sum + leg::row(&place.0) * Dual::new(forces[*row], V::zero());
+        sum = sum + leg::row(leg, &place.0) * Dual::new(forces[*row], V::zero());
         *row += 1;
     }
     sum
@@ -240,7 +240,11 @@ impl Varied {
         let mech = geometry::varied(mech, Some(by));
         let varies = |a: Vec3<Dual<f64>>| a.array().iter().any(|x| x.d != 0.0);
         let leg_varies = |leg: &Leg<Dual<f64>>| {
-            varies(leg.base.point) || varies(leg.platform.point) || varies(leg.turning.axis())
+            let drive = match leg.drive {
+                Drive::Telescope => false,
+                Drive::Slider { rail, strut, .. } => varies(rail) || strut.d != 0.0,
+            };
+            drive || varies(leg.base.point) || varies(leg.platform.point) || varies(leg.turning.axis())
         };
         let legs = (0..mech.legs.len()).filter(|&i| leg_varies(&mech.legs[i])).collect();
         let constraint_varies = |k: &usize| {
@@ -293,7 +297,7 @@ pub(crate) fn by_geometry<V: Lanes>(
     }
     let moving = along(&solved.platform, &step);
     for (i, leg) in mech.legs.iter().enumerate() {
-        lengths[i] = leg::position(leg, &moving.pose).length.d;
+        lengths[i] = leg::position(leg, &moving.pose).coordinate.d;
     }
     column
 }

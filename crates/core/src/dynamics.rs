@@ -4,7 +4,7 @@
 use crate::jacobian::{Matrix6, other_rows, scaled, scaled_jacobian};
 use crate::leg;
 use crate::linear::{solve, solve_all};
-use crate::mechanism::{Body, Leg, Mechanism, Rod};
+use crate::mechanism::{Body, Drive, Leg, Mechanism, Rod};
 use crate::real::{Constant, Real};
 use crate::spatial::{Acceleration, Mat3, Motion, Pose, Twist, Vec3, Wrench};
 use crate::spec::Axes;
@@ -84,7 +84,7 @@ pub(crate) fn leg_wrench<T: Real>(
     wrench
 }
 
-/// Cylinder and piston, carried to the platform. All along n, δ, m.
+/// Cylinder and piston, or carriage and strut, carried to the platform \[T14\] \[T69\]. All along n, δ, m.
 #[inline(always)]
 pub(crate) fn links_wrench<T: Real>(
     mech: &Mechanism<impl Constant<T>>,
@@ -96,11 +96,22 @@ pub(crate) fn links_wrench<T: Real>(
     let at_base = axes.transpose_mul(Vec3::lift(mech.gravity));
     let at_b = at_base - axes.transpose_mul(state.end.a_b);
     let (force, about_b) = turning_force(piston, &state.turn, at_b);
-    let (_, about_base) = turning_force(cylinder, &state.turn, at_base);
-    // Both turn as one.
-    let inertia = piston.inertia + cylinder.inertia;
-    let torque = turning_torque(inertia, state.turn.omega, state.turn.eps);
-    leg::carry(leg, state, force, torque + about_b + about_base)
+    match leg.drive {
+        Drive::Telescope => {
+            let (_, about_base) = turning_force(cylinder, &state.turn, at_base);
+            // Both turn as one.
+            let inertia = piston.inertia + cylinder.inertia;
+            let torque = turning_torque(inertia, state.turn.omega, state.turn.eps);
+            leg::carry(leg, state, force, torque + about_b + about_base)
+        }
+        Drive::Slider { rail, .. } => {
+            let torque = turning_torque(piston.inertia, state.turn.omega, state.turn.eps);
+            // The carriage's power is what pushes it along the rail, times q'.
+            let push = Vec3::lift(mech.gravity).dot(Vec3::lift(rail)) - state.end.acceleration;
+            let carriage = leg::row(leg, &state.position) * push.scale(cylinder.mass);
+            leg::carry(leg, state, force, torque + about_b) + carriage
+        }
+    }
 }
 
 /// Weight and inertial force of a link of a leg \[T8\] \[T13\], and its torque about the link's reference point;
@@ -212,7 +223,7 @@ impl<T: Real> Balance<T> {
     ) {
         self.wrench = self.wrench + leg_wrench(mech, index, leg, place, platform);
         if leg.actuated {
-            self.rows[self.count] = leg::row(&place.0).array();
+            self.rows[self.count] = leg::row(leg, &place.0).array();
             self.count += 1;
         }
     }
@@ -286,11 +297,12 @@ pub fn energy<T: Real>(mech: &Mechanism<impl Constant<T>>, pose: &Pose<T>, twist
     for (i, leg) in mech.legs.iter().enumerate() {
         let state = leg::state(leg, &platform);
         let (axes, omega) = (state.frame.axes, state.omega());
-        let base = Vec3::lift(leg.base.point);
+        let foot = leg::foot(leg, &state.position);
         let (piston, cylinder) = (leg::piston(leg, &state), leg::cylinder(leg, &state));
-        let place = base + state.position.r + piston.offset;
+        let place = foot + state.position.r + piston.offset;
         sum = with_energy(sum, mech, &leg.piston, axes, omega, piston.velocity, place);
-        let place = base + cylinder.offset;
+        let place = foot + cylinder.offset;
+        // A carriage has no inertia here, as it does not turn.
         sum = with_energy(sum, mech, &leg.cylinder, axes, omega, cylinder.velocity, place);
         for rod in &mech.rods {
             if rod.leader == i {

@@ -7,7 +7,7 @@ use crate::constraint;
 use crate::idle;
 use crate::leg;
 use crate::linear::solve;
-use crate::mechanism::Mechanism;
+use crate::mechanism::{Drive, Leg, Mechanism};
 use crate::real::{Ordered, Real};
 use crate::spatial::{Pose, Twist, Vec3, Wrench};
 use crate::status::Status;
@@ -47,6 +47,49 @@ const CLEARLY: f64 = 0.25;
 /// of rounding.
 pub const FOLD_PIVOTS: f64 = 1e-5;
 
+/// What is asked of an actuated leg: where its foot is on the rail (zero for a telescopic leg, whose foot is B), and the
+/// square of the distance from there to b \[T25\] \[T69\].
+#[derive(Clone, Copy, Debug)]
+pub struct Asked<T> {
+    pub place: T,
+    pub square: T,
+}
+
+impl<T: Real> Asked<T> {
+    /// From the one number that varies: the squared length of a telescopic leg, the place of a carriage.
+    #[inline(always)]
+    pub fn of(leg: &Leg, number: T) -> Self {
+        match leg.drive {
+            Drive::Telescope => Asked { place: T::zero(), square: number },
+            Drive::Slider { strut, .. } => Asked { place: number, square: T::lit(strut * strut) },
+        }
+    }
+
+    /// Nothing.
+    #[inline(always)]
+    pub fn none() -> Self {
+        Asked { place: T::zero(), square: T::zero() }
+    }
+
+    /// r from the foot that is asked for, given that from B.
+    #[inline(always)]
+    pub fn vector(&self, leg: &Leg, r: Vec3<T>) -> Vec3<T> {
+        match leg.drive {
+            Drive::Telescope => r,
+            Drive::Slider { rail, .. } => r - Vec3::lift(rail) * self.place,
+        }
+    }
+
+    /// The rate of `(ℓ² - r·r)/2` when what is asked for changes; r as above.
+    #[inline(always)]
+    pub fn change(leg: &Leg, r: Vec3<T>, rate: &Asked<T>) -> T {
+        match leg.drive {
+            Drive::Telescope => rate.square.scale(0.5),
+            Drive::Slider { rail, .. } => rate.square.scale(0.5) + r.dot(Vec3::lift(rail)) * rate.place,
+        }
+    }
+}
+
 /// The equations at a pose, pure numbers: `(r·r - ℓ²)/2Λ²` of the actuated legs and g of the independent constraints
 /// \[T25\]. The matrix is their derivative by (v/Λ, ω).
 #[derive(Clone, Copy, Debug)]
@@ -56,13 +99,15 @@ pub struct System<T> {
 }
 
 #[inline(always)]
-pub fn system<T: Real>(mech: &Mechanism, pose: &Pose<T>, squares: &[T; 6]) -> System<T> {
+pub fn system<T: Real>(mech: &Mechanism, pose: &Pose<T>, asked: &[Asked<T>; 6]) -> System<T> {
     let scale = mech.characteristic_length;
     let mut system = System { residual: [T::zero(); 6], matrix: [[T::zero(); 6]; 6] };
     let mut count = 0;
     for (_, leg) in mech.actuated() {
         let (e, r) = leg::vectors(leg, pose);
-        system.put(count, scale, (r.dot(r) - squares[count]).scale(0.5), Wrench::at(e, r), scale * scale);
+        let r = asked[count].vector(leg, r);
+        let value = (r.dot(r) - asked[count].square).scale(0.5);
+        system.put(count, scale, value, Wrench::at(e, r), scale * scale);
         count += 1;
     }
     for idle in &mech.idle {
@@ -94,10 +139,42 @@ impl<T: Real> System<T> {
     }
 }
 
-/// The squared lengths of the actuated legs, in the order of the equations.
+/// What varies of an actuated leg, in the order of the equations: its squared length, or the place of its carriage.
 #[must_use]
-pub fn squares(lengths: &[f64]) -> [f64; 6] {
-    std::array::from_fn(|i| lengths.get(i).map_or(0.0, |l| l * l))
+pub fn numbers(mech: &Mechanism, coordinates: &[f64]) -> [f64; 6] {
+    let mut numbers = [0.0; 6];
+    for ((number, (_, leg)), &q) in numbers.iter_mut().zip(mech.actuated()).zip(coordinates) {
+        *number = number_of(leg, q);
+    }
+    numbers
+}
+
+/// That of one leg.
+#[must_use]
+pub fn number_of(leg: &Leg, coordinate: f64) -> f64 {
+    match leg.drive {
+        Drive::Telescope => coordinate * coordinate,
+        Drive::Slider { .. } => coordinate,
+    }
+}
+
+/// What is asked of the actuated legs.
+#[must_use]
+pub fn asked(mech: &Mechanism, coordinates: &[f64]) -> [Asked<f64>; 6] {
+    let mut asked = [Asked::none(); 6];
+    for ((asked, (_, leg)), &q) in asked.iter_mut().zip(mech.actuated()).zip(coordinates) {
+        *asked = Asked::of(leg, number_of(leg, q));
+    }
+    asked
+}
+
+/// Whether actuated legs can have these coordinates: numbers, and lengths none below zero.
+#[must_use]
+pub fn are_coordinates(mech: &Mechanism, coordinates: &[f64]) -> bool {
+    mech.actuated().zip(coordinates).all(|((_, leg), q)| match leg.drive {
+        Drive::Telescope => *q >= 0.0 && q.is_finite(),
+        Drive::Slider { .. } => q.is_finite(),
+    })
 }
 
 /// A solution (v/Λ, ω) of the system as a step of the pose.
@@ -119,8 +196,8 @@ struct Newton {
 }
 
 #[inline(always)]
-fn newton(mech: &Mechanism, pose: &Pose<f64>, squares: &[f64; 6], to: &[f64; 6]) -> Newton {
-    let System { residual, matrix } = system(mech, pose, squares);
+fn newton(mech: &Mechanism, pose: &Pose<f64>, asked: &[Asked<f64>; 6], to: &[f64; 6]) -> Newton {
+    let System { residual, matrix } = system(mech, pose, asked);
     let residual: [f64; 6] = std::array::from_fn(|i| residual[i] - to[i]);
     let solved = solve(matrix, residual.map(|f| -f));
     Newton {
@@ -156,17 +233,17 @@ pub struct Found {
 /// mode.
 #[must_use]
 pub fn forward_kinematics(mech: &Mechanism, lengths: &[f64], guess: &Pose<f64>) -> Found {
-    let squares = squares(lengths);
-    if !lengths.iter().all(|l| *l >= 0.0 && l.is_finite()) {
+    let asked = asked(mech, lengths);
+    if !are_coordinates(mech, lengths) {
         let nan = f64::NAN;
         return Found { pose: *guess, residual: nan, iterations: 0, sign: nan, status: Status::InvalidInput };
     }
-    let (continued, steps) = continuation(mech, &squares, guess, SHORTEST_PIECE);
+    let (continued, steps) = continuation(mech, &asked, guess, SHORTEST_PIECE);
     if let Some(pose) = continued {
-        let found = polish(mech, &squares, &pose);
+        let found = polish(mech, &asked, &pose);
         return Found { iterations: steps + found.iterations, ..found };
     }
-    let other = polish(mech, &squares, guess);
+    let other = polish(mech, &asked, guess);
     let status = if other.status == Status::Ok { Status::ModeJump } else { other.status };
     Found { iterations: steps + other.iterations, status, ..other }
 }
@@ -182,14 +259,14 @@ pub fn passed(
     last: &Pose<f64>,
     found: &Found,
 ) -> Option<Found> {
-    let squares = squares(lengths);
+    let asked = asked(mech, lengths);
     let turn = last.rotation * before.rotation.transpose();
     let ahead = Pose { rotation: turn * last.rotation, o: last.o + last.o - before.o };
-    if newton(mech, &ahead, &squares, &[0.0; 6]).sign == found.sign {
+    if newton(mech, &ahead, &asked, &[0.0; 6]).sign == found.sign {
         return None;
     }
-    let (pose, steps) = continuation(mech, &squares, &ahead, SHORTEST_PIECE);
-    let other = polish(mech, &squares, &pose?);
+    let (pose, steps) = continuation(mech, &asked, &ahead, SHORTEST_PIECE);
+    let other = polish(mech, &asked, &pose?);
     let from_ahead = |pose: &Pose<f64>| {
         let turned = (ahead.rotation.transpose() * pose.rotation).rotation_vector().norm();
         turned.hypot((pose.o - ahead.o).norm() / mech.characteristic_length)
@@ -208,11 +285,11 @@ pub fn passed(
 #[must_use]
 pub fn continuation(
     mech: &Mechanism,
-    squares: &[f64; 6],
+    asked: &[Asked<f64>; 6],
     guess: &Pose<f64>,
     shortest: f64,
 ) -> (Option<Pose<f64>>, u32) {
-    let System { residual: errors, matrix } = system(mech, guess, squares);
+    let System { residual: errors, matrix } = system(mech, guess, asked);
     let sign = solve(matrix, errors).sign;
     let (mut pose, mut t, mut piece, mut steps) = (*guess, 0.0, 1.0_f64, 0);
     while t < 1.0 {
@@ -220,7 +297,7 @@ pub fn continuation(
         let rest = errors.map(|e| (1.0 - t - piece) * e);
         let (mut trial, mut last, mut arrived) = (pose, f64::INFINITY, false);
         for _ in 0..PIECE_STEPS {
-            let at = newton(mech, &trial, squares, &rest);
+            let at = newton(mech, &trial, asked, &rest);
             steps += 1;
             if at.sign != sign || !(at.size <= LONGEST_STEP && at.size <= CONTRACTION * last) {
                 // Steps of the size of rounding contract no more.
@@ -248,14 +325,14 @@ pub fn continuation(
 
 /// A solution near a pose, whatever its mode, by Newton steps that are shortened until they come nearer \[T26\].
 #[must_use]
-pub fn polish(mech: &Mechanism, squares: &[f64; 6], guess: &Pose<f64>) -> Found {
+pub fn polish(mech: &Mechanism, asked: &[Asked<f64>; 6], guess: &Pose<f64>) -> Found {
     let mut pose = *guess;
-    let mut at = newton(mech, &pose, squares, &[0.0; 6]);
+    let mut at = newton(mech, &pose, asked, &[0.0; 6]);
     let (mut share, mut iterations) = (1.0_f64, 0);
     while !(at.residual <= ROUNDING) && iterations < NEWTON_STEPS {
         share = share.min(LONGEST_STEP / at.size);
         let trial_pose = pose.stepped(&step_of(mech, at.step, share));
-        let trial = newton(mech, &trial_pose, squares, &[0.0; 6]);
+        let trial = newton(mech, &trial_pose, asked, &[0.0; 6]);
         iterations += 1;
         // The last step of a quadratic iteration ends in rounding, whatever it does to the residual.
         let last = at.size <= SMALL_STEP && trial.residual <= MOST_ROUNDING;
@@ -275,17 +352,18 @@ pub fn polish(mech: &Mechanism, squares: &[f64; 6], guess: &Pose<f64>) -> Found 
     } else {
         Status::Singular
     };
-    Found { pose, residual: error(mech, squares, &pose), iterations, sign: at.sign, status }
+    Found { pose, residual: error(mech, asked, &pose), iterations, sign: at.sign, status }
 }
 
 /// The largest error of a length or of a constraint, m; NaN where one is not known.
 #[inline(always)]
 #[must_use]
-pub fn error<V: Ordered>(mech: &Mechanism, squares: &[V; 6], pose: &Pose<V>) -> V {
+pub fn error<V: Ordered>(mech: &Mechanism, asked: &[Asked<V>; 6], pose: &Pose<V>) -> V {
     let (mut errors, mut count) = ([V::zero(); 6], 0);
     for leg in &mech.legs {
         if leg.actuated {
-            errors[count] = (leg::position(leg, pose).length - squares[count].sqrt()).abs();
+            let r = asked[count].vector(leg, leg::vectors(leg, pose).1);
+            errors[count] = (r.norm() - asked[count].square.sqrt()).abs();
             count += 1;
         }
     }

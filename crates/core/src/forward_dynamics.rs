@@ -48,7 +48,7 @@ pub fn forward_dynamics<T: Real>(
     let mut count = 0;
     for leg in &mech.legs {
         if leg.actuated {
-            push = push + leg::row(&leg::position(leg, pose)) * forces[count];
+            push = push + leg::row(leg, &leg::position(leg, pose)) * forces[count];
             count += 1;
         }
     }

@@ -2,8 +2,8 @@
 //! where it gets by with one piece of the path. The other states are told apart by masks and left to it.
 
 use crate::forward::{
-    CONTRACTION, FOLD_PIVOTS, Found, LONGEST_STEP, PIECE_STEPS, ROUNDING, SMALL_STEP, System, error,
-    forward_kinematics, polish, squares, step_of, system,
+    Asked, CONTRACTION, FOLD_PIVOTS, Found, LONGEST_STEP, PIECE_STEPS, ROUNDING, SMALL_STEP, System,
+    are_coordinates, asked, error, forward_kinematics, numbers, polish, step_of, system,
 };
 use crate::lanes::{self, Lanes, Row, Task, WIDTH};
 use crate::linear::{Solved, solve};
@@ -14,24 +14,24 @@ use crate::status::Status;
 /// The columns of R and o of each.
 pub(crate) type Poses = [Row; 12];
 
-/// Lengths of the actuated legs, and a guess.
-pub type Asked = (Vec<f64>, Pose<f64>);
+/// Coordinates of the actuated legs, and a guess.
+pub type Guessed = (Vec<f64>, Pose<f64>);
 
 /// [`forward_kinematics`](crate::forward::forward_kinematics) of at most [`WIDTH`] states, each as if it were alone.
 ///
 /// # Panics
 /// If there are more.
 #[must_use]
-pub fn forward_kinematics_of(mech: &Mechanism, states: &[Asked]) -> Vec<Found> {
+pub fn forward_kinematics_of(mech: &Mechanism, states: &[Guessed]) -> Vec<Found> {
     let (mut poses, mut to) = ([[0.0; WIDTH]; 12], [[0.0; WIDTH]; 6]);
     for (k, (lengths, guess)) in states.iter().enumerate() {
         put(&mut poses, k, guess);
-        put_squares(&mut to, k, lengths);
+        put_numbers(mech, &mut to, k, lengths);
     }
-    let mut lanes: Vec<Lane> = states.iter().map(|(lengths, _)| Lane::new(lengths)).collect();
+    let mut lanes: Vec<Lane> = states.iter().map(|(lengths, _)| Lane::new(mech, lengths)).collect();
     let mut at = Newtons::default();
     while lanes.iter().any(Lane::is_under_way) {
-        lanes::dispatch(Evaluation { mech, poses: &poses, squares: &to, result: &mut at });
+        lanes::dispatch(Evaluation { mech, poses: &poses, numbers: &to, result: &mut at });
         for (k, lane) in lanes.iter_mut().enumerate().filter(|(_, lane)| lane.is_under_way()) {
             if lane.judge(&at, k) {
                 for (row, next) in poses.iter_mut().zip(&at.next) {
@@ -41,9 +41,9 @@ pub fn forward_kinematics_of(mech: &Mechanism, states: &[Asked]) -> Vec<Found> {
         }
     }
     let mut errors = [0.0; WIDTH];
-    lanes::dispatch(Errors { mech, poses: &poses, squares: &to, result: &mut errors });
+    lanes::dispatch(Errors { mech, poses: &poses, numbers: &to, result: &mut errors });
     let lanes = lanes.iter().zip(states).enumerate();
-    let found = |(k, (lane, (lengths, guess))): (usize, (&Lane, &Asked))| {
+    let found = |(k, (lane, (lengths, guess))): (usize, (&Lane, &Guessed))| {
         lane.found(mech, lengths, guess, &get(&poses, k), errors[k])
     };
     lanes.map(found).collect()
@@ -53,7 +53,7 @@ pub fn forward_kinematics_of(mech: &Mechanism, states: &[Asked]) -> Vec<Found> {
 struct Errors<'a> {
     mech: &'a Mechanism,
     poses: &'a Poses,
-    squares: &'a [Row; 6],
+    numbers: &'a [Row; 6],
     result: &'a mut Row,
 }
 
@@ -62,8 +62,8 @@ impl Task for Errors<'_> {
     fn run<V: Lanes>(self) {
         let mut k = 0;
         while k < WIDTH {
-            let squares = load_squares(self.squares, k);
-            error::<V>(self.mech, &squares, &load(self.poses, k)).store(&mut self.result[k..]);
+            let asked = load_asked(self.mech, self.numbers, k);
+            error::<V>(self.mech, &asked, &load(self.poses, k)).store(&mut self.result[k..]);
             k += V::WIDTH;
         }
     }
@@ -145,8 +145,8 @@ struct Lane {
 }
 
 impl Lane {
-    fn new(lengths: &[f64]) -> Self {
-        let valid = lengths.iter().all(|l| *l >= 0.0 && l.is_finite());
+    fn new(mech: &Mechanism, lengths: &[f64]) -> Self {
+        let valid = are_coordinates(mech, lengths);
         let [steps, last, sign] = BEGINNING;
         Lane { stage: if valid { Stage::Going } else { Stage::Left }, piece: Piece { steps, last, sign } }
     }
@@ -193,7 +193,7 @@ impl Lane {
                 Found { pose: *pose, residual, iterations, sign, status }
             }
             Stage::Rounding => {
-                let found = polish(mech, &squares(lengths), pose);
+                let found = polish(mech, &asked(mech, lengths), pose);
                 Found { iterations: self.piece.steps as u32 + found.iterations, ..found }
             }
             Stage::Going | Stage::Arrived | Stage::Left => forward_kinematics(mech, lengths, guess),
@@ -212,8 +212,8 @@ pub(crate) struct Newton<V> {
 }
 
 #[inline(always)]
-pub(crate) fn newton<V: Lanes>(mech: &Mechanism, pose: &Pose<V>, squares: &[Row; 6], k: usize) -> Newton<V> {
-    let System { residual, matrix } = system(mech, pose, &load_squares(squares, k));
+pub(crate) fn newton<V: Lanes>(mech: &Mechanism, pose: &Pose<V>, numbers: &[Row; 6], k: usize) -> Newton<V> {
+    let System { residual, matrix } = system(mech, pose, &load_asked(mech, numbers, k));
     let (mut rhs, mut largest, mut sum) = (residual, V::zero(), V::zero());
     for f in &mut rhs {
         largest = largest.most(f.abs());
@@ -227,20 +227,23 @@ pub(crate) fn newton<V: Lanes>(mech: &Mechanism, pose: &Pose<V>, squares: &[Row;
     Newton { next, size: sum.sqrt(), residual: largest, pivots, sign }
 }
 
-/// The squared lengths of a state.
-pub(crate) fn put_squares(rows: &mut [Row; 6], k: usize, lengths: &[f64]) {
-    for (row, square) in rows.iter_mut().zip(squares(lengths)) {
-        row[k] = square;
+/// What varies of the legs of a state: see [`numbers`].
+pub(crate) fn put_numbers(mech: &Mechanism, rows: &mut [Row; 6], k: usize, coordinates: &[f64]) {
+    for (row, number) in rows.iter_mut().zip(numbers(mech, coordinates)) {
+        row[k] = number;
     }
 }
 
 #[inline(always)]
-pub(crate) fn load_squares<V: Lanes>(squares: &[Row; 6], k: usize) -> [V; 6] {
-    let mut loaded = [V::zero(); 6];
-    for i in 0..6 {
-        loaded[i] = V::load(&squares[i][k..]);
+pub(crate) fn load_asked<V: Lanes>(mech: &Mechanism, numbers: &[Row; 6], k: usize) -> [Asked<V>; 6] {
+    let (mut asked, mut count) = ([Asked::none(); 6], 0);
+    for leg in &mech.legs {
+        if leg.actuated {
+            asked[count] = Asked::of(leg, V::load(&numbers[count][k..]));
+            count += 1;
+        }
     }
-    loaded
+    asked
 }
 
 /// Newton steps side by side.
@@ -256,7 +259,7 @@ struct Newtons {
 struct Evaluation<'a> {
     mech: &'a Mechanism,
     poses: &'a Poses,
-    squares: &'a [Row; 6],
+    numbers: &'a [Row; 6],
     result: &'a mut Newtons,
 }
 
@@ -265,7 +268,7 @@ impl Task for Evaluation<'_> {
     fn run<V: Lanes>(self) {
         let mut k = 0;
         while k < WIDTH {
-            let at = newton::<V>(self.mech, &load(self.poses, k), self.squares, k);
+            let at = newton::<V>(self.mech, &load(self.poses, k), self.numbers, k);
             store(&at.next, &mut self.result.next, k);
             at.size.store(&mut self.result.size[k..]);
             at.residual.store(&mut self.result.residual[k..]);
@@ -322,7 +325,7 @@ mod tests {
         let mut draw = Draw(9);
         for mech in common::mechanisms().iter().filter(|m| m.actuated().count() == m.dof()) {
             let lengths = |pose: &Pose<f64>| -> Vec<f64> {
-                mech.actuated().map(|(_, leg)| leg::position(leg, pose).length).collect()
+                mech.actuated().map(|(_, leg)| leg::position(leg, pose).coordinate).collect()
             };
             // Guesses from next to the solution to far off, lengths that no pose has, and invalid ones.
             let mut states: Vec<(Vec<f64>, Pose<f64>)> = common::states(mech, 25, 4)

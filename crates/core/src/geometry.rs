@@ -2,7 +2,7 @@
 
 use crate::assembly;
 use crate::idle;
-use crate::mechanism::{Joint, Leg, Mechanism, Rod, Side, Turning};
+use crate::mechanism::{Drive, Joint, Leg, Mechanism, Rod, Side, Turning};
 use crate::real::Dual;
 use crate::spatial::Vec3;
 use crate::spec::JointKind;
@@ -11,6 +11,9 @@ use crate::spec::JointKind;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Place {
     Joint(usize, Side),
+    /// Of a slider.
+    Rail(usize),
+    Strut(usize),
     Rod(usize),
 }
 
@@ -21,6 +24,8 @@ pub enum Vector {
     Axis,
     /// The same, of an F joint.
     Normal,
+    /// One number.
+    Length,
 }
 
 /// One component of a point or an axis, in the axes of its body.
@@ -32,28 +37,32 @@ pub struct Parameter {
 }
 
 impl Parameter {
-    /// `leg 1 base point_x`, `rod L axis_z`.
+    /// `leg 1 base point_x`, `leg 1 rail axis_x`, `leg 1 strut length`, `rod L axis_z`.
     #[must_use]
     pub fn name(&self, mech: &Mechanism) -> String {
         let place = match self.place {
             Place::Joint(i, Side::Base) => format!("leg {} base", mech.legs[i].name),
             Place::Joint(i, Side::Platform) => format!("leg {} platform", mech.legs[i].name),
+            Place::Rail(i) => format!("leg {} rail", mech.legs[i].name),
+            Place::Strut(i) => format!("leg {} strut", mech.legs[i].name),
             Place::Rod(i) => format!("rod {}", mech.rods[i].name),
         };
         let vector = match self.vector {
             Vector::Point => "point",
             Vector::Axis => "axis",
             Vector::Normal => "normal",
+            Vector::Length => return format!("{place} length"),
         };
         format!("{place} {vector}_{}", ["x", "y", "z"][self.component])
     }
 }
 
-/// All of them in order: base joint and platform joint of each leg, rods. A leg on a rod has the rod's axis, no own.
+/// All of them in order: base joint and platform joint of each leg, of a slider its rail and strut; rods. A leg on a rod
+/// has the rod's axis, no own.
 #[must_use]
 pub fn parameters(mech: &Mechanism) -> Vec<Parameter> {
     let joints = mech.legs.iter().enumerate().flat_map(|(i, leg)| {
-        [(Side::Base, &leg.base, leg.rod), (Side::Platform, &leg.platform, None)].map(|(side, joint, rod)| {
+        let of_joint = |(side, joint, rod): (Side, &Joint, Option<usize>)| {
             let vectors: &[Vector] = match joint.kind {
                 _ if rod.is_some() => &[Vector::Point],
                 JointKind::Spherical => &[Vector::Point],
@@ -61,12 +70,23 @@ pub fn parameters(mech: &Mechanism) -> Vec<Parameter> {
                 JointKind::Fixed => &[Vector::Point, Vector::Axis, Vector::Normal],
             };
             (Place::Joint(i, side), vectors)
-        })
+        };
+        let slider: &[(Place, &[Vector])] = match leg.drive {
+            Drive::Telescope => &[],
+            Drive::Slider { .. } => {
+                &[(Place::Rail(i), &[Vector::Axis]), (Place::Strut(i), &[Vector::Length])]
+            }
+        };
+        let joints = [(Side::Base, &leg.base, leg.rod), (Side::Platform, &leg.platform, None)].map(of_joint);
+        joints.into_iter().chain(slider.to_vec())
     });
     let rods = (0..mech.rods.len()).map(|i| (Place::Rod(i), &[Vector::Point, Vector::Axis][..]));
     let vectors = joints.chain(rods).flat_map(|(place, vectors)| vectors.iter().map(move |&v| (place, v)));
+    let count = |vector: Vector| if vector == Vector::Length { 1 } else { 3 };
     vectors
-        .flat_map(|(place, vector)| (0..3).map(move |component| Parameter { place, vector, component }))
+        .flat_map(|(place, vector)| {
+            (0..count(vector)).map(move |component| Parameter { place, vector, component })
+        })
         .collect()
 }
 
@@ -103,9 +123,18 @@ pub fn varied(mech: &Mechanism, by: Option<&Parameter>) -> Mechanism<Dual<f64>> 
         }
         let platform = joint(Place::Joint(i, Side::Platform), &leg.platform);
         let turning = assembly::turning(&base, &platform);
+        let drive = match leg.drive {
+            Drive::Telescope => Drive::Telescope,
+            Drive::Slider { rail, strut, branch } => {
+                let varies = by.is_some_and(|by| by.place == Place::Strut(i));
+                let strut = Dual::new(strut, f64::from(u8::from(varies)));
+                Drive::Slider { rail: lift(Place::Rail(i), Vector::Axis, rail), strut, branch }
+            }
+        };
         Leg {
             name: leg.name.clone(),
             actuated: leg.actuated,
+            drive,
             radius: leg.radius,
             rod: leg.rod,
             cylinder: leg.cylinder.clone(),

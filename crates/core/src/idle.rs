@@ -116,7 +116,7 @@ pub(crate) fn find(mech: &Mechanism, independent: &[Constraint], poses: &[Pose<f
 /// Twists, orthonormal as (v, Λω), that no leg and no constraint feels.
 fn unfelt(mech: &Mechanism, independent: &[Constraint], pose: &Pose<f64>) -> Vec<Twist<f64>> {
     let scale = mech.characteristic_length;
-    let legs = mech.legs.iter().map(|leg| leg::row(&leg::position(leg, pose)));
+    let legs = mech.legs.iter().map(|leg| leg::row(leg, &leg::position(leg, pose)));
     let rows: Vec<[f64; 6]> = legs
         .chain(independent.iter().map(|c| constraint::row(c, pose)))
         .map(|row| pure_row(row * (1.0 / constraint::row_unit(&row, scale)), scale))

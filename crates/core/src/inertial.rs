@@ -3,7 +3,7 @@
 
 use crate::dynamics::{self, Answering};
 use crate::leg;
-use crate::mechanism::{Body, Leg, Mechanism, Turning};
+use crate::mechanism::{Body, Drive, Leg, Mechanism, Turning};
 use crate::real::{Dual, Real};
 use crate::redundant::Parted;
 use crate::spatial::{Mat3, Motion, Twist, Vec3, Wrench};
@@ -47,6 +47,9 @@ const EACH: [&[usize]; NUMBERS] = [&[0], &[1], &[2], &[3], &[4], &[5], &[6], &[7
 /// What a body has that is symmetric about its leg, as it must be where the leg spins freely: I_xx and I_zz are one.
 const SYMMETRIC: [&[usize]; 4] = [&[0], &[2], &[4, 9], &[7]];
 
+/// What a body has that does not turn and is held by a rail: its mass.
+const SLIDING: [&[usize]; 1] = [&[0]];
+
 /// One inertial parameter of a link.
 #[derive(Clone, Copy, Debug)]
 pub struct Parameter {
@@ -71,8 +74,8 @@ impl Parameter {
     fn name(&self, mech: &Mechanism, names: &[&str; NUMBERS]) -> String {
         let link = match self.link {
             Link::Platform => "platform".to_owned(),
-            Link::Cylinder(i) => format!("cylinder {}", mech.legs[i].name),
-            Link::Piston(i) => format!("piston {}", mech.legs[i].name),
+            Link::Cylinder(i) => format!("{} {}", mech.legs[i].links()[0], mech.legs[i].name),
+            Link::Piston(i) => format!("{} {}", mech.legs[i].links()[1], mech.legs[i].name),
             Link::Rod(i) => format!("rod {}", mech.rods[i].name),
         };
         let names: Vec<&str> = self.numbers.iter().map(|&k| names[k]).collect();
@@ -89,7 +92,11 @@ fn spins_freely(leg: &Leg) -> bool {
 pub fn parameters(mech: &Mechanism) -> Vec<Parameter> {
     let legs = mech.legs.iter().enumerate().flat_map(|(i, leg)| {
         let numbers: &[&[usize]] = if spins_freely(leg) { &SYMMETRIC } else { &EACH };
-        [(Link::Cylinder(i), numbers), (Link::Piston(i), numbers)]
+        let first: &[&[usize]] = match leg.drive {
+            Drive::Telescope => numbers,
+            Drive::Slider { .. } => &SLIDING,
+        };
+        [(Link::Cylinder(i), first), (Link::Piston(i), numbers)]
     });
     let rods = (0..mech.rods.len()).map(|i| (Link::Rod(i), &EACH[..]));
     std::iter::once((Link::Platform, &EACH[..]))

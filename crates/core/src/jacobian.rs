@@ -19,7 +19,7 @@ pub fn jacobian<T: Real>(mech: &Mechanism<impl Constant<T>>, pose: &Pose<T>) -> 
     let mut count = 0;
     for leg in &mech.legs {
         if leg.actuated {
-            rows[count] = leg::row(&leg::position(leg, pose)).array();
+            rows[count] = leg::row(leg, &leg::position(leg, pose)).array();
             count += 1;
         }
     }
@@ -75,7 +75,7 @@ pub fn hessian<T: Real>(mech: &Mechanism<impl Constant<T>>, pose: &Pose<T>) -> [
     let mut count = 0;
     for leg in &mech.legs {
         if leg.actuated {
-            layers[count] = leg::hessian(&leg::position(leg, pose));
+            layers[count] = leg::hessian(leg, &leg::position(leg, pose));
             count += 1;
         }
     }

@@ -12,7 +12,7 @@ use crate::forward::forward_kinematics;
 use crate::lanes::WIDTH;
 use crate::leg;
 use crate::limits::{Bound, Measure};
-use crate::mechanism::Mechanism;
+use crate::mechanism::{Drive, Mechanism};
 use crate::spatial::{Pose, Vec3};
 use crate::status::Status;
 use steps::{AXES, Met, Predicted, Room, Way, follow, marker, predict};
@@ -229,7 +229,7 @@ fn short(place: Vec3<f64>) -> [f32; 3] {
 
 impl Lattice {
     /// Lengths from the least to the greatest of each stroke in steps of about `step`, and layers of z of the height
-    /// `layer`; o within `bounds`. None where an actuated leg has no stroke, or the node next to the start pose has no pose inside all
+    /// `layer`; o within `bounds`. None where an actuated leg has no stroke or is no telescopic one, or the node next to the start pose has no pose inside all
     /// limits in its mode.
     #[must_use]
     pub fn new(
@@ -242,6 +242,7 @@ impl Lattice {
         let axes: Option<Vec<Axis>> = mech
             .actuated()
             .map(|(i, leg)| {
+                let Drive::Telescope = leg.drive else { return None };
                 let end = |least: bool| {
                     mech.limits.iter().find_map(|l| match (&l.measure, l.bound) {
                         (Measure::Length(k), Bound::Least(x)) if *k == i && least => Some(x),
@@ -252,7 +253,8 @@ impl Lattice {
                 let (least, most) = (end(true)?, end(false)?);
                 let pieces = ((most - least) / step).round().max(1.0);
                 let step = (most - least) / pieces;
-                let center = ((leg::position(leg, start).length - least) / step).round().clamp(0.0, pieces);
+                let center =
+                    ((leg::position(leg, start).coordinate - least) / step).round().clamp(0.0, pieces);
                 Some(Axis { least, step, count: pieces as usize + 1, center: center as usize, stride: 1 })
             })
             .collect();
@@ -443,7 +445,7 @@ mod tests {
     use super::*;
     use crate::common::published;
     use crate::coordinates::Set;
-    use crate::forward::{continuation, size, step_of, system};
+    use crate::forward::{Asked, continuation, size, step_of, system};
     use crate::limits::Limit;
     use crate::linear::solve;
     use crate::mechanism::Side;
@@ -488,7 +490,9 @@ mod tests {
             let ahead = std::array::from_fn(|k| {
                 if from[k] == to[k] { to[k] } else { (1.0 - goal) * from[k] + goal * to[k] }
             });
-            let found = continuation(mech, &ahead, &pose, 1.0).0;
+            let ahead: [f64; 6] = ahead;
+            let asked = ahead.map(|square| Asked { place: 0.0, square });
+            let found = continuation(mech, &asked, &pose, 1.0).0;
             let inside = |pose: &Pose<f64>| {
                 let o = pose.o.array();
                 (0..3).all(|k| BOUNDS[k][0] <= o[k] && o[k] <= BOUNDS[k][1])
@@ -569,7 +573,11 @@ mod tests {
         for front in &lattice.fronts {
             for step in lattice.steps(&mech, front).iter().flatten() {
                 let pose = &front.poses[step.source as usize];
-                let at = system(&mech, pose, &lattice.squares(step.node));
+                let at = system(
+                    &mech,
+                    pose,
+                    &lattice.squares(step.node).map(|square| Asked { place: 0.0, square }),
+                );
                 let x = solve(at.matrix, at.residual.map(|f| -f)).x;
                 let next = pose.stepped(&step_of(&mech, x, 1.0));
                 let off = marker(&mech, &next) - Vec3::from(step.marker.map(f64::from));

@@ -4,7 +4,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use crate::constraint;
-use crate::forward::{FOLD_PIVOTS, Found, LONGEST_STEP, SMALL_STEP, step_of};
+use crate::forward::{FOLD_PIVOTS, Found, LONGEST_STEP, SMALL_STEP, are_coordinates, step_of};
 use crate::leg;
 use crate::mechanism::Mechanism;
 use crate::mobility::RANK_TOLERANCE;
@@ -56,7 +56,7 @@ impl Misses {
         let scale = mech.characteristic_length;
         let (rows, n) = (pure_rows(mech, pose, scale), lengths.len());
         let short =
-            mech.actuated().zip(lengths).map(|((_, leg), asked)| leg::position(leg, pose).length - asked);
+            mech.actuated().zip(lengths).map(|((_, leg), asked)| leg::position(leg, pose).coordinate - asked);
         let idle = mech.idle.iter().map(|_| 0.0);
         let off = mech.independent.iter().map(|c| constraint::value(c, pose) * constraint::length(c, scale));
         let legs = DVector::from_iterator(n, short) / scale;
@@ -103,7 +103,7 @@ pub fn forward_kinematics(mech: &Mechanism, lengths: &[f64], guess: &Pose<f64>) 
         sign: f64::NAN,
         status: Status::InvalidInput,
     };
-    if !lengths.iter().all(|l| *l >= 0.0 && l.is_finite()) {
+    if !are_coordinates(mech, lengths) {
         return nothing;
     }
     let lost = Found { status: Status::NotConverged, ..nothing };
@@ -146,7 +146,9 @@ pub fn forward_kinematics(mech: &Mechanism, lengths: &[f64], guess: &Pose<f64>) 
 /// The largest error of a length or of a constraint, m.
 #[must_use]
 pub fn error(mech: &Mechanism, lengths: &[f64], pose: &Pose<f64>) -> f64 {
-    let legs =
-        mech.actuated().zip(lengths).map(|((_, leg), asked)| (leg::position(leg, pose).length - asked).abs());
+    let legs = mech
+        .actuated()
+        .zip(lengths)
+        .map(|((_, leg), asked)| (leg::position(leg, pose).coordinate - asked).abs());
     legs.fold(constraint::largest_distance(mech, pose), |m, e| if e > m || e.is_nan() { e } else { m })
 }

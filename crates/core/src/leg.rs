@@ -1,20 +1,23 @@
 //! One leg: where it is, how its platform end moves, how it turns, and how its links move.
 
-use crate::mechanism::{Leg, Side, Turning};
+use crate::mechanism::{Drive, Leg, Side, Turning};
 use crate::quadratic::{Hessian, add_centripetal, point_columns};
 use crate::real::{Constant, Ordered, Real};
 use crate::spatial::{Mat3, Motion, Pose, Vec3, Wrench};
 
-/// Where the leg is, base axes \[T1\].
+/// Where the leg is, base axes \[T1\] \[T67\].
 #[derive(Clone, Copy, Debug)]
 pub struct Position<T> {
     /// From o to b.
     pub e: Vec3<T>,
-    /// From B to b.
+    /// From the strut's foot to b: from B, or from the carriage of a slider.
     pub r: Vec3<T>,
+    /// Of the strut.
     pub length: T,
     /// Unit vector of r.
     pub delta: Vec3<T>,
+    /// Of the prismatic joint: the length ℓ, or the place q of the carriage.
+    pub coordinate: T,
 }
 
 /// e from o to b and r from B to b.
@@ -24,34 +27,82 @@ pub fn vectors<T: Real>(leg: &Leg<impl Constant<T>>, pose: &Pose<T>) -> (Vec3<T>
     (e, pose.o + e - Vec3::lift(leg.base.point))
 }
 
-/// [Eq. 2, 3] \[T1\] `e = R m, b = o + e, r = b - B, δ = r/ℓ`.
+/// [Eq. 2, 3] \[T1\] `e = R m, b = o + e, r = b - B, δ = r/ℓ`; of a slider \[T67\], whose coordinate is not a number where
+/// its strut does not reach the rail.
 #[inline(always)]
 pub fn position<T: Real>(leg: &Leg<impl Constant<T>>, pose: &Pose<T>) -> Position<T> {
     let (e, r) = vectors(leg, pose);
-    let length = r.norm();
-    Position { e, r, length, delta: r * (T::one() / length) }
+    match leg.drive {
+        Drive::Telescope => {
+            let length = r.norm();
+            Position { e, r, length, delta: r * (T::one() / length), coordinate: length }
+        }
+        Drive::Slider { rail, strut, branch } => {
+            let (a, c) = (Vec3::lift(rail), strut.lift());
+            let along = a.dot(r);
+            let across = r - a * along;
+            let ahead = (c * c - across.dot(across)).sqrt().scale(branch);
+            let r = across + a * ahead;
+            Position { e, r, length: c, delta: r * (T::one() / c), coordinate: along - ahead }
+        }
+    }
 }
 
-/// The wrench of a unit force of the actuator, a row of the Jacobian [Eq. 6].
+/// Where the strut begins, base axes.
 #[inline(always)]
-pub fn row<T: Real>(p: &Position<T>) -> Wrench<T> {
-    Wrench::at(p.e, p.delta)
+pub fn foot<T: Real>(leg: &Leg<impl Constant<T>>, p: &Position<T>) -> Vec3<T> {
+    let base = Vec3::lift(leg.base.point);
+    match leg.drive {
+        Drive::Telescope => base,
+        Drive::Slider { rail, .. } => base + Vec3::<T>::lift(rail) * p.coordinate,
+    }
 }
 
-/// The symmetric h with `ℓ'' = (δ, e×δ)·A + Vᵀ h V` \[T11\], the symmetric part of [Eq. 15].
+/// δ·d, d being the direction of the prismatic joint: one of a telescopic leg, zero where a strut is square to its rail.
 #[inline(always)]
-pub fn hessian<T: Real>(p: &Position<T>) -> Hessian<T> {
-    // ℓ'' = δ·a_b + |v_b - (δ·v_b) δ|²/ℓ: the second term is |P V|²/ℓ with P = (1 - δδᵀ) [1, -e×].
+pub fn transmission<T: Real>(leg: &Leg<impl Constant<T>>, p: &Position<T>) -> T {
+    match leg.drive {
+        Drive::Telescope => T::one(),
+        Drive::Slider { rail, .. } => p.delta.dot(Vec3::lift(rail)),
+    }
+}
+
+/// The wrench of a unit force of the actuator, a row of the Jacobian [Eq. 6] \[T68\].
+#[inline(always)]
+pub fn row<T: Real>(leg: &Leg<impl Constant<T>>, p: &Position<T>) -> Wrench<T> {
+    match leg.drive {
+        Drive::Telescope => Wrench::at(p.e, p.delta),
+        Drive::Slider { .. } => Wrench::at(p.e, p.delta * (T::one() / transmission(leg, p))),
+    }
+}
+
+/// The symmetric h with `ℓ'' = (δ, e×δ)·A + Vᵀ h V` \[T11\], the symmetric part of [Eq. 15]; of a slider with
+/// `q'' = (δ, e×δ)·A/(δ·a) + Vᵀ h V` \[T68\].
+#[inline(always)]
+pub fn hessian<T: Real>(leg: &Leg<impl Constant<T>>, p: &Position<T>) -> Hessian<T> {
+    // (δ·d) q'' = δ·a_b + |P v_b|²/ℓ with P = 1 - dδᵀ/(δ·d).
     let mut h = [[T::zero(); 6]; 6];
     add_centripetal(&mut h, p.e, p.delta);
     let inverse = T::one() / p.length;
     let mut columns = point_columns(p.e);
+    let along = match leg.drive {
+        Drive::Telescope => p.delta,
+        Drive::Slider { rail, .. } => Vec3::<T>::lift(rail) * (T::one() / transmission(leg, p)),
+    };
     for v in &mut columns {
-        *v = *v - p.delta * p.delta.dot(*v);
+        *v = *v - along * p.delta.dot(*v);
     }
     for i in 0..6 {
         for j in 0..6 {
             h[i][j] = columns[i].dot(columns[j]).mul_add(inverse, h[i][j]);
+        }
+    }
+    if let Drive::Slider { .. } = leg.drive {
+        let inverse = T::one() / transmission(leg, p);
+        for row in &mut h {
+            for x in row {
+                *x = *x * inverse;
+            }
         }
     }
     h
@@ -118,12 +169,13 @@ pub fn frame<T: Real>(leg: &Leg<impl Constant<T>>, pose: &Pose<T>, p: &Position<
     Frame { axes: Mat3::from_columns(n, p.delta, n.cross(p.delta)), sine, slope }
 }
 
-/// How the platform end moves, and with it the leg's length and direction \[T2\]-\[T4\].
+/// How the platform end moves, and with it the leg's coordinate and direction \[T2\]-\[T4\] \[T68\].
 #[derive(Clone, Copy, Debug)]
 pub struct End<T> {
     /// Base axes.
     pub v_b: Vec3<T>,
     pub a_b: Vec3<T>,
+    /// Of the coordinate: ℓ' and ℓ'', or q' and q''.
     pub rate: T,
     pub acceleration: T,
     /// δ' along n and m.
@@ -133,21 +185,42 @@ pub struct End<T> {
 }
 
 #[inline(always)]
-pub fn end<T: Real>(p: &Position<T>, f: &Frame<T>, platform: &Motion<T>) -> End<T> {
+pub fn end<T: Real>(
+    leg: &Leg<impl Constant<T>>,
+    p: &Position<T>,
+    f: &Frame<T>,
+    platform: &Motion<T>,
+) -> End<T> {
     let Motion { twist, acceleration, .. } = platform;
     let (omega, e, inverse) = (twist.omega, p.e, T::one() / p.length);
     // [Eq. 20] [T2] v_b = v + ω×e;  [Eq. 34] a_b = a + ε×e + ω×(ω×e)
     let spin_e = omega.cross(e);
     let v_b = twist.v + spin_e;
     let a_b = acceleration.a + acceleration.eps.cross(e) + omega.cross(spin_e);
-    // In the leg's axes: [Eq. 6] [T3] ℓ' = δ·v_b;  δ' = (v_b - ℓ'δ)/ℓ
     let (v, a) = (f.axes.transpose_mul(v_b), f.axes.transpose_mul(a_b));
-    let rate = [v.x * inverse, v.z * inverse];
-    // [Eq. 15] [T4] ℓ'' = δ·a_b + v_b·δ';  δ'' = (a_b - ℓ''δ - 2ℓ'δ')/ℓ
-    let second = v.x.mul_add(rate[0], v.z.mul_add(rate[1], a.y));
-    let twice = v.y + v.y;
-    let delta_acceleration = [(a.x - twice * rate[0]) * inverse, (a.z - twice * rate[1]) * inverse];
-    End { v_b, a_b, rate: v.y, acceleration: second, delta_rate: rate, delta_acceleration }
+    match leg.drive {
+        Drive::Telescope => {
+            // In the leg's axes: [Eq. 6] [T3] ℓ' = δ·v_b;  δ' = (v_b - ℓ'δ)/ℓ
+            let rate = [v.x * inverse, v.z * inverse];
+            // [Eq. 15] [T4] ℓ'' = δ·a_b + v_b·δ';  δ'' = (a_b - ℓ''δ - 2ℓ'δ')/ℓ
+            let second = v.x.mul_add(rate[0], v.z.mul_add(rate[1], a.y));
+            let twice = v.y + v.y;
+            let delta_acceleration = [(a.x - twice * rate[0]) * inverse, (a.z - twice * rate[1]) * inverse];
+            End { v_b, a_b, rate: v.y, acceleration: second, delta_rate: rate, delta_acceleration }
+        }
+        Drive::Slider { rail, .. } => {
+            // [T68] q' = δ·v_b/(δ·a);  δ' = (v_b - q'a)/c
+            let d = f.axes.transpose_mul(Vec3::lift(rail));
+            let share = T::one() / d.y;
+            let q = v.y * share;
+            let rate = [(v.x - q * d.x) * inverse, (v.z - q * d.z) * inverse];
+            // [T68] q'' = (δ·a_b + c |δ'|²)/(δ·a);  δ'' = (a_b - q''a)/c
+            let square = rate[0].mul_add(rate[0], rate[1] * rate[1]);
+            let second = p.length.mul_add(square, a.y) * share;
+            let delta_acceleration = [(a.x - second * d.x) * inverse, (a.z - second * d.z) * inverse];
+            End { v_b, a_b, rate: q, acceleration: second, delta_rate: rate, delta_acceleration }
+        }
+    }
 }
 
 /// How the leg turns \[T6\].
@@ -243,7 +316,7 @@ pub fn moving<T: Real>(
     &(position, frame): &Place<T>,
     platform: &Motion<T>,
 ) -> State<T> {
-    let end = end(&position, &frame, platform);
+    let end = end(leg, &position, &frame, platform);
     let turn = turn(leg, platform, &end, &frame);
     State { position, end, frame, turn }
 }
@@ -254,7 +327,7 @@ pub fn state<T: Real>(leg: &Leg<impl Constant<T>>, platform: &Motion<T>) -> Stat
 }
 
 /// Carries a force F at b and a torque M on the leg, both along n, δ, m, to the platform: `F·v_b + M·ω_leg` as a wrench
-/// at o \[T14\].
+/// at o \[T14\] \[T69\].
 #[inline(always)]
 pub fn carry<T: Real>(
     leg: &Leg<impl Constant<T>>,
@@ -267,7 +340,15 @@ pub fn carry<T: Real>(
     // M·ω = (M×δ)·δ' + (M·δ) s, and δ' = (v_b - ℓ'δ)/ℓ
     let along_n = f.slope.mul_add(torque.y, -torque.z).mul_add(inverse, force.x);
     let along_m = torque.x.mul_add(inverse, force.z);
-    let wrench = Wrench::at(p.e, f.axes * Vec3::new(along_n, force.y, along_m));
+    let along_delta = match leg.drive {
+        Drive::Telescope => force.y,
+        Drive::Slider { rail, .. } => {
+            // δ' = (v_b - (δ·v_b) a/(δ·a))/c: what turns the strut along the rail is felt along δ.
+            let d = f.axes.transpose_mul(Vec3::lift(rail));
+            force.y - ((along_n - force.x) * d.x + (along_m - force.z) * d.z) / d.y
+        }
+    };
+    let wrench = Wrench::at(p.e, f.axes * Vec3::new(along_n, along_delta, along_m));
     match leg.turning {
         // s = κ n·(δ' - ω×δ) + ω·δ
         Turning::Across(Side::Platform, _) | Turning::Along(Side::Platform, _) => {
@@ -307,10 +388,17 @@ pub fn piston<T: Real>(leg: &Leg<impl Constant<T>>, state: &State<T>) -> PointMo
     point_motion(state, leg.piston.center, state.end.v_b, state.end.a_b)
 }
 
-/// The cylinder's mass centre, offset from B [Eq. 38, 39] \[T8\].
+/// The cylinder's mass centre, offset from B [Eq. 38, 39] \[T8\]; that of a carriage from the strut's foot.
 #[inline(always)]
 pub fn cylinder<T: Real>(leg: &Leg<impl Constant<T>>, state: &State<T>) -> PointMotion<T> {
-    point_motion(state, leg.cylinder.center, Vec3::zero(), Vec3::zero())
+    match leg.drive {
+        Drive::Telescope => point_motion(state, leg.cylinder.center, Vec3::zero(), Vec3::zero()),
+        Drive::Slider { rail, .. } => {
+            let (a, End { rate, acceleration, .. }) = (Vec3::<T>::lift(rail), state.end);
+            let offset = Vec3::lift(leg.cylinder.center);
+            PointMotion { offset, velocity: a * rate, acceleration: a * acceleration }
+        }
+    }
 }
 
 /// How a rod turns about its own line, from the leg that leads it \[T7\].

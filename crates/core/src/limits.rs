@@ -10,7 +10,7 @@ use crate::forward_lanes::{Poses, get, store};
 use crate::joints::{self, Zero};
 use crate::lanes::{Lanes, Row, WIDTH};
 use crate::leg::{self, Position};
-use crate::mechanism::{Leg, Mechanism, Side};
+use crate::mechanism::{Drive, Leg, Mechanism, Side};
 use crate::real::{Ordered, Real, Trig};
 use crate::singularity;
 use crate::spatial::{Pose, Vec3};
@@ -30,7 +30,7 @@ pub struct Limit {
 /// What a limit measures. Legs count from 0.
 #[derive(Clone, Debug)]
 pub enum Measure {
-    /// Length of a leg, m.
+    /// Length of a leg, or place of its carriage, m.
     Length(usize),
     /// Angle between a leg and the cone axis of its joint, rad.
     Cone(usize, Side),
@@ -230,14 +230,14 @@ impl<T: Real> Seen<T> {
     #[inline(always)]
     pub(crate) fn next(&mut self, p: &Position<T>) {
         if self.count < REMEMBERED {
-            self.lengths[self.count] = p.length;
+            self.lengths[self.count] = p.coordinate;
             self.count += 1;
         }
     }
 
     #[inline(always)]
     fn length(&mut self, mech: &Mechanism, pose: &Pose<T>, leg: usize) -> T {
-        if leg < self.count { self.lengths[leg] } else { self.position(mech, pose, leg).length }
+        if leg < self.count { self.lengths[leg] } else { self.position(mech, pose, leg).coordinate }
     }
 
     #[inline(always)]
@@ -276,13 +276,23 @@ impl Strut {
     fn in_base<T: Real>(&self, mech: &Mechanism, pose: &Pose<T>) -> Segment<T> {
         let leg = &mech.legs[self.leg];
         let b = pose.o + pose.rotation.of(leg.platform.point);
-        Segment(Vec3::lift(leg.base.point), b).without(self.cut)
+        Segment(self.foot(mech, pose), b).without(self.cut)
+    }
+
+    /// Where the strut begins, base axes.
+    #[inline(always)]
+    fn foot<T: Real>(&self, mech: &Mechanism, pose: &Pose<T>) -> Vec3<T> {
+        let leg = &mech.legs[self.leg];
+        match leg.drive {
+            Drive::Telescope => Vec3::lift(leg.base.point),
+            Drive::Slider { .. } => leg::foot(leg, &leg::position(leg, pose)),
+        }
     }
 
     #[inline(always)]
     fn in_platform<T: Real>(&self, mech: &Mechanism, pose: &Pose<T>) -> Segment<T> {
         let leg = &mech.legs[self.leg];
-        let foot = pose.rotation.transpose_mul(Vec3::lift(leg.base.point) - pose.o);
+        let foot = pose.rotation.transpose_mul(self.foot(mech, pose) - pose.o);
         Segment(foot, Vec3::lift(leg.platform.point)).without(self.cut)
     }
 }

@@ -46,6 +46,22 @@ impl<S> Turning<S> {
     }
 }
 
+/// What a leg's prismatic joint moves \[T67\].
+#[derive(Clone, Copy, Debug)]
+pub enum Drive<S = f64> {
+    /// The strut's far end, along the strut: the joint's coordinate is the length ℓ.
+    Telescope,
+    /// The strut's foot, along a rail fixed in the base: the coordinate is its place q from B. The strut is rigid.
+    Slider {
+        /// Unit vector a, base axes.
+        rail: Vec3<S>,
+        /// c, m.
+        strut: S,
+        /// The sign of δ·a: one of the two places from which a strut reaches b.
+        branch: f64,
+    },
+}
+
 #[derive(Clone, Debug)]
 pub struct Joint<S = f64> {
     pub kind: JointKind,
@@ -63,25 +79,39 @@ pub struct Joint<S = f64> {
 pub struct Leg<S = f64> {
     pub name: String,
     pub actuated: bool,
+    pub drive: Drive<S>,
     /// Of the strut, m.
     pub radius: Option<f64>,
     pub base: Joint<S>,
     pub platform: Joint<S>,
     /// The rod that carries the base joint. Seen from the leg the joint is then U with the rod's line as its axis.
     pub rod: Option<usize>,
-    /// Centre measured from B, in leg axes.
+    /// Centre measured from B, in leg axes. Of a slider: the carriage, in base axes, which does not turn.
     pub cylinder: Body,
-    /// Centre measured from b, in leg axes.
+    /// Centre measured from b, in leg axes. Of a slider: the strut.
     pub piston: Body,
     pub turning: Turning<S>,
 }
 
 impl<S> Leg<S> {
-    /// Letters of its joints from base to platform, `RPU` for one on a rod.
+    /// Letters of its joints from base to platform, `RPU` for one on a rod, `PUS` for a slider.
     #[must_use]
     pub fn letters(&self) -> String {
         let base = if self.rod.is_some() { "R" } else { self.base.kind.letter() };
-        format!("{base}P{}", self.platform.kind.letter())
+        let platform = self.platform.kind.letter();
+        match self.drive {
+            Drive::Telescope => format!("{base}P{platform}"),
+            Drive::Slider { .. } => format!("P{base}{platform}"),
+        }
+    }
+
+    /// Words for its two links, from the base on.
+    #[must_use]
+    pub fn links(&self) -> [&'static str; 2] {
+        match self.drive {
+            Drive::Telescope => ["cylinder", "piston"],
+            Drive::Slider { .. } => ["carriage", "strut"],
+        }
     }
 }
 

@@ -9,7 +9,7 @@ use crate::draw::Draw;
 use crate::idle::{self, Idle, IdleRow};
 use crate::leg;
 use crate::mechanism::{
-    Constraint, ConstraintRow, Graph, GraphJoint, GraphLink, Leg, Mechanism, Mobility, Side, Turning,
+    Constraint, ConstraintRow, Drive, Graph, GraphJoint, GraphLink, Leg, Mechanism, Mobility, Side, Turning,
 };
 use crate::spatial::{Mat3, Pose, Vec3, Wrench};
 use crate::spec::JointKind;
@@ -177,7 +177,7 @@ fn rank_of(m: &DMatrix<f64>) -> usize {
 /// Freedoms, idle ones apart, that are left when the actuated legs keep their lengths, at a pose.
 fn uncontrolled(mech: &Mechanism, independent: &[Constraint], idle: &[Idle], pose: &Pose<f64>) -> usize {
     let size = mech.characteristic_length;
-    let legs = mech.actuated().map(|(_, leg)| leg::row(&leg::position(leg, pose)));
+    let legs = mech.actuated().map(|(_, leg)| leg::row(leg, &leg::position(leg, pose)));
     let others = independent.iter().map(|c| constraint::row(c, pose));
     let rows: Vec<Wrench<f64>> =
         legs.chain(others).chain(idle.iter().map(|idle| idle::row(idle, pose))).collect();
@@ -254,7 +254,11 @@ impl Screw {
 fn leg_screws(leg: &Leg, pose: &Pose<f64>) -> Vec<Screw> {
     let p = leg::position(leg, pose);
     let n = leg::frame(leg, pose, &p).n();
-    let below = leg.base.point - pose.o;
+    let below = leg::foot(leg, &p) - pose.o;
+    let slide = match leg.drive {
+        Drive::Telescope => p.delta,
+        Drive::Slider { rail, .. } => rail,
+    };
     let (base, platform) = (leg.base.axis.unwrap_or(n), leg.platform.axis.map_or(n, |a| pose.rotation * a));
     let turns = |kind: JointKind, axis: Vec3<f64>| match kind {
         JointKind::Spherical => vec![Vec3::X, Vec3::Y, Vec3::Z],
@@ -268,7 +272,7 @@ fn leg_screws(leg: &Leg, pose: &Pose<f64>) -> Vec<Screw> {
         base_turns.remove(0);
     }
     let mut screws: Vec<Screw> = base_turns.into_iter().map(|a| Screw::turn(a, below)).collect();
-    screws.push(Screw { linear: p.delta * p.length, angular: Vec3::zero() });
+    screws.push(Screw { linear: slide * p.length, angular: Vec3::zero() });
     screws.extend(turns(leg.platform.kind, platform).into_iter().map(|a| Screw::turn(a, p.e)));
     screws
 }
@@ -292,17 +296,27 @@ fn graph(mech: &Mechanism) -> Graph {
             names.len() - 1
         };
         let ground = leg.rod.map_or(0, |rod| rods[rod]);
-        let (cylinder, piston) = (link(leg.base.kind, 0, "cylinder"), link(leg.platform.kind, 1, "piston"));
+        // A joint F makes one link of two; a carriage is a link whatever the joint on it.
+        let kinds = match leg.drive {
+            Drive::Telescope => [leg.base.kind, leg.platform.kind],
+            Drive::Slider { .. } => [leg.base.kind, leg.platform.kind].map(|_| JointKind::Revolute),
+        };
+        let [first, second] = leg.links();
+        let (first, second) = (link(kinds[0], 0, first), link(kinds[1], 1, second));
         let below = if leg.rod.is_some() { JointKind::Revolute } else { leg.base.kind };
         let mut join = |kind: &'static str, place: &str, links| {
             joints.push(GraphJoint { kind, name: format!("{place} {}", leg.name), links });
         };
+        let (base_joint, prismatic) = match leg.drive {
+            Drive::Telescope => ([ground, first], [first, second]),
+            Drive::Slider { .. } => ([first, second], [0, first]),
+        };
         if below != JointKind::Fixed {
-            join(below.letter(), "base joint", [ground, cylinder]);
+            join(below.letter(), "base joint", base_joint);
         }
-        join("P", "prismatic", [cylinder, piston]);
+        join("P", "prismatic", prismatic);
         if leg.platform.kind != JointKind::Fixed {
-            join(leg.platform.kind.letter(), "platform joint", [piston, 1]);
+            join(leg.platform.kind.letter(), "platform joint", [second, 1]);
         }
     }
     let links = names.into_iter().enumerate().map(|(i, name)| {

@@ -5,12 +5,12 @@
 //! are followed along a path of lengths to the ones that are asked for, and the real ones kept.
 
 use crate::draw::Draw;
-use crate::forward::{self, Found, System, step_of, system};
+use crate::forward::{self, Asked, Found, System, step_of, system};
 use crate::idle::Idle;
 use crate::least;
 use crate::leg;
 use crate::linear::solve;
-use crate::mechanism::{Mechanism, Side};
+use crate::mechanism::{Drive, Leg, Mechanism, Side};
 use crate::mobility::count;
 use crate::paths::{C, End, INFINITE, Path, modulus};
 use crate::real::Real;
@@ -63,7 +63,7 @@ const MOST_SOLUTIONS: usize = 1000;
 /// All solutions for generic complex lengths: where every search starts.
 #[derive(Clone, Debug)]
 pub struct Start {
-    squares: [C; 6],
+    asked: [Asked<C>; 6],
     poses: Vec<Pose<C>>,
     mirror: Option<Mirror>,
     /// With as many of its legs actuated as it takes, where there are more.
@@ -84,7 +84,7 @@ impl Start {
             // planar mechanism stays in the plane.
             self.mirror = self.mirror.filter(|m| {
                 let mirrored = m.apply(&pose);
-                let residual = system(mech, &mirrored, &self.squares).residual;
+                let residual = system(mech, &mirrored, &self.asked).residual;
                 residual.iter().all(|f| f.norm() < SAME) && distance(mech, &mirrored, &pose) > SAME
             });
         }
@@ -171,13 +171,12 @@ pub fn start(mech: &Mechanism) -> Option<Start> {
         return Some(Start { square: Some(Box::new(square)), ..found });
     }
     let mut draw = Draw(0x9E37_79B9_7F4A_7C15);
-    let home = squares_at(mech, &Pose::lift(&mech.home));
-    let squares: [C; 6] = std::array::from_fn(|i| home[i] * (C::lit(1.0) + draw.complex().scale(GENERIC)));
-    let mut result = Start { squares, poses: Vec::new(), mirror: Mirror::of(mech), square: None };
+    let asked = generic(mech, GENERIC, &mut draw);
+    let mut result = Start { asked, poses: Vec::new(), mirror: Mirror::of(mech), square: None };
     // Every component of the set of complex poses has its own solutions: random poses reach each of them.
     for _ in 0..SEEDS {
         if let Some(pose) = random_pose(mech, &mut draw) {
-            let path = Path { mech, from: squares_at(mech, &pose), to: squares, precision: CLOSE };
+            let path = Path { mech, from: asked_at(mech, &pose), to: asked, precision: CLOSE };
             for pose in path.follow(&[pose]).into_iter().filter_map(End::regular) {
                 result.extend(mech, pose);
             }
@@ -188,10 +187,8 @@ pub fn start(mech: &Mechanism) -> Option<Start> {
     for round in 0..MOST_LOOPS {
         let reach = LOOPS[round % LOOPS.len()];
         let known = result.poses.len();
-        let corners: [[C; 6]; 2] = std::array::from_fn(|_| {
-            std::array::from_fn(|i| home[i] * (C::lit(1.0) + draw.complex().scale(reach)))
-        });
-        let sides = [(squares, corners[0]), (corners[0], corners[1]), (corners[1], squares)];
+        let corners = [(); 2].map(|()| generic(mech, reach, &mut draw));
+        let sides = [(asked, corners[0]), (corners[0], corners[1]), (corners[1], asked)];
         let mut poses = result.poses.clone();
         for (from, to) in sides {
             let ends = Path { mech, from, to, precision: CLOSE }.follow(&poses);
@@ -222,7 +219,7 @@ fn random_pose(mech: &Mechanism, draw: &mut Draw) -> Option<Pose<C>> {
     let free: [[C; 6]; 6] = std::array::from_fn(|_| std::array::from_fn(|_| draw.complex()));
     let dof = mech.dof();
     for _ in 0..30 {
-        let System { residual, matrix } = system(mech, &pose, &[C::lit(0.0); 6]);
+        let System { residual, matrix } = system(mech, &pose, &[Asked::none(); 6]);
         let rows = std::array::from_fn(|i| if i < dof { free[i] } else { matrix[i] });
         let rhs: [C; 6] = std::array::from_fn(|i| if i < dof { C::lit(0.0) } else { -residual[i] });
         let step = solve(rows, rhs).x;
@@ -238,14 +235,36 @@ fn random_pose(mech: &Mechanism, draw: &mut Draw) -> Option<Pose<C>> {
     None
 }
 
-/// Squared lengths of the actuated legs.
-fn squares_at(mech: &Mechanism, pose: &Pose<C>) -> [C; 6] {
-    let mut squares = [C::lit(0.0); 6];
-    for (square, (_, leg)) in squares.iter_mut().zip(mech.actuated()) {
-        let (_, r) = leg::vectors(leg, pose);
-        *square = r.dot(r);
+/// What a pose meets: squared lengths of the actuated legs, carriages as at home.
+fn asked_at(mech: &Mechanism, pose: &Pose<C>) -> [Asked<C>; 6] {
+    let mut asked = [Asked::none(); 6];
+    for (asked, (_, leg)) in asked.iter_mut().zip(mech.actuated()) {
+        *asked = at_home(mech, leg);
+        let r = asked.vector(leg, leg::vectors(leg, pose).1);
+        asked.square = r.dot(r);
     }
-    squares
+    asked
+}
+
+/// What the home pose meets.
+fn at_home(mech: &Mechanism, leg: &Leg) -> Asked<C> {
+    let Asked { place, square } =
+        Asked::of(leg, forward::number_of(leg, leg::position(leg, &mech.home).coordinate));
+    Asked { place: C::lit(place), square: C::lit(square) }
+}
+
+/// Complex squares of lengths that are off those at home by about `reach` times as much, and places of carriages by as
+/// many struts as that makes of lengths.
+fn generic(mech: &Mechanism, reach: f64, draw: &mut Draw) -> [Asked<C>; 6] {
+    let mut asked = [Asked::none(); 6];
+    for (asked, (_, leg)) in asked.iter_mut().zip(mech.actuated()) {
+        let Asked { place, square } = at_home(mech, leg);
+        *asked = Asked { place, square: square * (C::lit(1.0) + draw.complex().scale(reach)) };
+        if let Drive::Slider { strut, .. } = leg.drive {
+            asked.place = place + draw.complex().scale(strut * reach.min(reach.sqrt()));
+        }
+    }
+    asked
 }
 
 fn norm(x: &[C; 6]) -> f64 {
@@ -359,15 +378,15 @@ pub fn assembly_modes_of_all(mech: &Mechanism, start: &Start, lengths: &[f64]) -
 /// Every real pose with the given lengths of the actuated legs \[T28\].
 #[must_use]
 pub fn assembly_modes(mech: &Mechanism, start: &Start, lengths: &[f64]) -> Modes {
-    if !lengths.iter().all(|l| *l >= 0.0 && l.is_finite()) {
+    if !forward::are_coordinates(mech, lengths) {
         return Modes { modes: vec![], status: Status::InvalidInput };
     }
-    let squares = forward::squares(lengths);
-    let to = squares.map(C::lit);
+    let asked = forward::asked(mech, lengths);
+    let to = asked.map(|Asked { place, square }| Asked { place: C::lit(place), square: C::lit(square) });
     let mut ends = Vec::new();
     let mut complete = false;
     for precision in PRECISIONS {
-        let path = Path { mech, from: start.squares, to, precision };
+        let path = Path { mech, from: start.asked, to, precision };
         ends = path.follow(&start.poses);
         complete = all_kept(mech, &ends);
         if complete {
@@ -380,7 +399,7 @@ pub fn assembly_modes(mech: &Mechanism, start: &Start, lengths: &[f64]) -> Modes
         let (End::Regular(pose) | End::Singular(pose)) = end else { continue };
         let mirrored = start.mirror.map(|m| m.apply(&pose));
         for pose in std::iter::once(pose).chain(mirrored) {
-            if let Some(mode) = real_mode(mech, &squares, &pose, up) {
+            if let Some(mode) = real_mode(mech, &asked, &pose, up) {
                 keep(mech, &mut modes, mode);
             }
         }
@@ -408,7 +427,7 @@ fn all_kept(mech: &Mechanism, ends: &[End]) -> bool {
 }
 
 /// The real pose that a complex solution is, if it is one.
-fn real_mode(mech: &Mechanism, squares: &[f64; 6], pose: &Pose<C>, up: Vec3<f64>) -> Option<Mode> {
+fn real_mode(mech: &Mechanism, asked: &[Asked<f64>; 6], pose: &Pose<C>, up: Vec3<f64>) -> Option<Mode> {
     let pose = &unspun(mech, pose);
     let o = pose.o * C::lit(1.0 / mech.characteristic_length);
     let parts = pose.rotation.0.iter().flat_map(|c| c.array()).chain(o.array());
@@ -420,8 +439,8 @@ fn real_mode(mech: &Mechanism, squares: &[f64; 6], pose: &Pose<C>, up: Vec3<f64>
     let [x, y, _] = pose.rotation.0.map(real);
     let (x, z) = (x.unit(), x.cross(y).unit());
     let guess = Pose { rotation: Mat3::from_columns(x, z.cross(x), z), o: real(pose.o) };
-    let Found { pose: found, sign, residual, status, .. } = forward::polish(mech, squares, &guess);
-    let longest = squares.iter().copied().fold(0.0, f64::max).sqrt();
+    let Found { pose: found, sign, residual, status, .. } = forward::polish(mech, asked, &guess);
+    let longest = asked.iter().map(|a| a.square).fold(0.0, f64::max).sqrt();
     let moved = distance(mech, &Pose::lift(&found), pose);
     // Off the real poses there are real ones nearby only where modes meet.
     let real = imaginary <= IMAGINARY || status == Status::Singular;

@@ -1,8 +1,9 @@
-//! Paths of complex solutions as the squared leg lengths change, several side by side \[T29\].
+//! Paths of complex solutions as squared leg lengths, or places of carriages, change, several side by side \[T29\].
 
 use crate::complex::Complex;
-use crate::forward::{FOLD_PIVOTS, System, system};
+use crate::forward::{Asked, FOLD_PIVOTS, System, system};
 use crate::lanes::{self, Lanes, Row, Task, WIDTH};
+use crate::leg;
 use crate::linear::{Solved, solve, solve_all};
 use crate::mechanism::Mechanism;
 use crate::real::{Ordered, Real};
@@ -62,12 +63,12 @@ impl End {
     }
 }
 
-/// A straight path of the squared lengths from t = 0 to t = 1.
+/// A straight path of what is asked of the legs from t = 0 to t = 1.
 #[derive(Clone, Copy, Debug)]
 pub struct Path<'a> {
     pub mech: &'a Mechanism,
-    pub from: [C; 6],
-    pub to: [C; 6],
+    pub from: [Asked<C>; 6],
+    pub to: [Asked<C>; 6],
     /// Error of a predicted step, as a pure number.
     pub precision: f64,
 }
@@ -390,22 +391,27 @@ impl Task for Evaluation<'_> {
     #[inline(always)]
     fn run<V: Lanes>(self) {
         let Path { mech, from, to, .. } = self.path;
-        let half = 0.5 / (mech.characteristic_length * mech.characteristic_length);
+        let unit = 1.0 / (mech.characteristic_length * mech.characteristic_length);
         let mut k = 0;
         while k < WIDTH {
             let place: Place<Complex<V>> = load(self.place, k);
             let t = V::load(&self.t[k..]);
-            let mut squares = [Complex::<V>::zero(); 6];
+            let pose = place.pose();
+            let mut asked = [Asked::none(); 6];
             let mut rates = [Complex::<V>::zero(); 6];
-            for i in 0..6 {
-                let change = to[i] - from[i];
-                squares[i] = Complex::new(
-                    V::lit(change.re).mul_add(t, V::lit(from[i].re)),
-                    V::lit(change.im).mul_add(t, V::lit(from[i].im)),
-                );
-                rates[i] = Complex::new(V::lit(change.re * half), V::lit(change.im * half));
+            let mut i = 0;
+            for leg in &mech.legs {
+                if leg.actuated {
+                    let (square, square_rate) = between(from[i].square, to[i].square, t);
+                    let (place, place_rate) = between(from[i].place, to[i].place, t);
+                    asked[i] = Asked { place, square };
+                    let rate = Asked { place: place_rate, square: square_rate };
+                    let r = asked[i].vector(leg, leg::vectors(leg, &pose).1);
+                    rates[i] = Asked::change(leg, r, &rate).scale(unit);
+                    i += 1;
+                }
             }
-            let System { mut residual, matrix } = system(mech, &place.pose(), &squares);
+            let System { mut residual, matrix } = system(mech, &pose, &asked);
             for f in &mut residual {
                 *f = -*f;
             }
@@ -417,6 +423,17 @@ impl Task for Evaluation<'_> {
             k += V::WIDTH;
         }
     }
+}
+
+/// A number at t, and its rate.
+#[inline(always)]
+fn between<V: Lanes>(from: C, to: C, t: V) -> (Complex<V>, Complex<V>) {
+    let change = to - from;
+    let at = Complex::new(
+        V::lit(change.re).mul_add(t, V::lit(from.re)),
+        V::lit(change.im).mul_add(t, V::lit(from.im)),
+    );
+    (at, Complex::new(V::lit(change.re), V::lit(change.im)))
 }
 
 #[inline(always)]
@@ -475,7 +492,8 @@ mod tests {
     fn paths_side_by_side_are_those_alone_bit_by_bit() {
         let mut draw = Draw(5);
         for mech in common::mechanisms() {
-            let [from, to] = [(); 2].map(|()| std::array::from_fn(|_| draw.complex()));
+            let [from, to] = [(); 2]
+                .map(|()| std::array::from_fn(|_| Asked { place: draw.complex(), square: draw.complex() }));
             let path = Path { mech: &mech, from, to, precision: 1e-3 };
             let (places, mut block) = (complex_places(&mut draw), ZERO);
             for (k, place) in places.iter().enumerate() {
@@ -495,8 +513,12 @@ mod tests {
             }
             let all: Vec<Evaluated> = all.into_iter().map(|(_, result)| result).collect();
             // Lane 3 is what the equations of that place alone say.
-            let squares = std::array::from_fn(|i| from[i] + (to[i] - from[i]).scale(t[3]));
-            let System { residual, matrix } = system(&mech, &places[3].pose(), &squares);
+            let at = |a: C, b: C| a + (b - a).scale(t[3]);
+            let asked = std::array::from_fn(|i| Asked {
+                place: at(from[i].place, to[i].place),
+                square: at(from[i].square, to[i].square),
+            });
+            let System { residual, matrix } = system(&mech, &places[3].pose(), &asked);
             let step = solve(matrix, residual.map(|f| -f)).x;
             let correction = places[3].along(&mech, &step);
             let found = Place::get(&all[0].correction, 3);

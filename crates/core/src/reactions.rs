@@ -6,7 +6,7 @@
 
 use crate::dynamics::{inertial_force, platform_wrench, rod_wrench, turning_torque};
 use crate::leg;
-use crate::mechanism::{Body, ConstraintKind, Leg, Mechanism};
+use crate::mechanism::{Body, ConstraintKind, Drive, Leg, Mechanism};
 use crate::real::Real;
 use crate::self_stress::Solver;
 use crate::spatial::{Mat3, Motion, Pose, Vec3, Wrench};
@@ -24,7 +24,8 @@ pub struct Joint {
     pub(crate) free: Vec<usize>,
 }
 
-/// All joints: the rods' bearings, then for each leg base joint, prismatic joint and platform joint.
+/// All joints: the rods' bearings, then for each leg base joint, prismatic joint and platform joint. A slider's prismatic
+/// joint lies below its base joint, between base and carriage.
 #[must_use]
 pub fn joints(mech: &Mechanism) -> Vec<Joint> {
     let mut all = Vec::new();
@@ -40,16 +41,20 @@ pub fn joints(mech: &Mechanism) -> Vec<Joint> {
             Some(rod) => (rod_name(rod), JointKind::Revolute),
             None => ("base".into(), leg.base.kind),
         };
-        let [cylinder, piston] = ["cylinder", "piston"].map(|link| format!("{link} {}", leg.name));
+        let [first, second] = leg.links().map(|link| format!("{link} {}", leg.name));
         let above = leg.platform.kind;
-        // The prismatic joint carries the active force along δ, and nothing there if it is passive.
+        // The prismatic joint carries the active force along its direction, and nothing there if it is passive.
         let slide: &[usize] = if leg.actuated { &[] } else { &[1] };
-        add(below.letter(), format!("base joint {}", leg.name), [ground, cylinder.clone()], turns(below));
-        add("P", format!("prismatic {}", leg.name), [cylinder, piston.clone()], slide);
+        let (base_joint, prismatic) = match leg.drive {
+            Drive::Telescope => ([ground, first.clone()], [first, second.clone()]),
+            Drive::Slider { .. } => ([first.clone(), second.clone()], [ground, first]),
+        };
+        add(below.letter(), format!("base joint {}", leg.name), base_joint, turns(below));
+        add("P", format!("prismatic {}", leg.name), prismatic, slide);
         add(
             above.letter(),
             format!("platform joint {}", leg.name),
-            [piston, "platform".into()],
+            [second, "platform".into()],
             turns(above),
         );
     }
@@ -108,7 +113,7 @@ pub(crate) fn put_places<T: Real>(mech: &Mechanism, pose: &Pose<T>, all: &mut [P
     }
 }
 
-/// Base joint at B, prismatic joint at b, platform joint at b.
+/// Base joint at B, prismatic joint at b, platform joint at b; of a slider the first two at the strut's foot.
 #[inline(always)]
 fn leg_places<T: Real>(leg: &Leg, pose: &Pose<T>, p: &leg::Position<T>, axes: &Mat3<T>) -> [Place<T>; 3] {
     let below = match (leg.rod, leg.base.kind, leg.base.axis) {
@@ -119,8 +124,16 @@ fn leg_places<T: Real>(leg: &Leg, pose: &Pose<T>, p: &leg::Position<T>, axes: &M
         (JointKind::Universal, Some(u)) => universal(pose.rotation.of(u), axes.0[0]),
         _ => *axes,
     };
-    let (base, end) = (Vec3::lift(leg.base.point), pose.o + p.e);
-    [Place { point: base, axes: below }, Place { point: end, axes: *axes }, Place { point: end, axes: above }]
+    let (base, end) = (leg::foot(leg, p), pose.o + p.e);
+    let slide = match leg.drive {
+        Drive::Telescope => Place { point: end, axes: *axes },
+        Drive::Slider { rail, .. } => {
+            let across = rail.perpendicular();
+            let axes = Mat3::from_columns(across, rail, across.cross(rail));
+            Place { point: base, axes: Mat3::lift(axes) }
+        }
+    };
+    [Place { point: base, axes: below }, slide, Place { point: end, axes: above }]
 }
 
 /// (u, n, u×n) for the two axes of a universal joint; its couple is about the third.
@@ -131,12 +144,12 @@ fn universal<T: Real>(u: Vec3<T>, n: Vec3<T>) -> Mat3<T> {
 }
 
 /// Weight, inertia and load of the links: at o for the platform (divided by the efficiency, as in [Eq. 43]), at a rod's
-/// point, at B for a cylinder and at b for a piston.
+/// point, at B for a cylinder and at b for a piston, at its foot for a carriage and at b for a strut.
 #[derive(Clone, Debug)]
 pub struct Given<T> {
     pub platform: Wrench<T>,
     pub rods: Vec<Wrench<T>>,
-    /// Cylinder and piston of each leg.
+    /// The two links of each leg.
     pub legs: Vec<[Wrench<T>; 2]>,
 }
 
@@ -184,6 +197,7 @@ fn link_wrench<T: Real>(
     center: &leg::PointMotion<T>,
     state: &leg::State<T>,
 ) -> Wrench<T> {
+    // A carriage, which does not turn, has no inertia here.
     let torque = state.frame.axes * turning_torque(body.inertia, state.turn.omega, state.turn.eps);
     let force = inertial_force(body, gravity, center.acceleration);
     Wrench::new(force, center.offset.cross(force) + torque)
@@ -217,14 +231,19 @@ pub(crate) fn put_reactions<T: Real>(
     }
     for (i, leg) in mech.legs.iter().enumerate() {
         let below = rods + 3 * i;
-        let (base, end) = (places[below].point, places[below + 1].point);
-        let [cylinder, piston] = given.legs[i];
-        let on_piston = on_platform[i] - piston;
-        let on_cylinder = on_piston.moved(end - base) - cylinder;
+        let (base, end) = (places[below].point, places[below + 2].point);
+        let [first, second] = given.legs[i];
+        let on_second = on_platform[i] - second;
+        let at_base = on_second.moved(end - base);
+        let on_first = at_base - first;
         if let Some(rod) = leg.rod {
-            all[rod] = all[rod] + on_cylinder.moved(base - places[rod].point);
+            all[rod] = all[rod] + on_first.moved(base - places[rod].point);
         }
-        (all[below], all[below + 1], all[below + 2]) = (on_cylinder, on_piston, on_platform[i]);
+        let (base_joint, prismatic) = match leg.drive {
+            Drive::Telescope => (on_first, on_second),
+            Drive::Slider { .. } => (at_base, on_first),
+        };
+        (all[below], all[below + 1], all[below + 2]) = (base_joint, prismatic, on_platform[i]);
     }
 }
 
@@ -339,7 +358,11 @@ pub(crate) fn constraint_wrench<T: Real>(
             let (above, p) = (platform_joint(mech, i), leg::position(leg, pose));
             sum = sum + reactions[above].moved(places[above].point - pose.o);
             if leg.actuated {
-                sum = sum - leg::row(&p) * reactions[above - 1].force.dot(p.delta);
+                let along = match leg.drive {
+                    Drive::Telescope => p.delta,
+                    Drive::Slider { rail, .. } => Vec3::lift(rail),
+                };
+                sum = sum - leg::row(leg, &p) * reactions[above - 1].force.dot(along);
             }
         }
     }

@@ -29,7 +29,7 @@ const CONTRADICTION: f64 = 1e-6;
 /// J, row by row [Eq. 13].
 #[must_use]
 pub fn jacobian(mech: &Mechanism, pose: &Pose<f64>) -> Vec<[f64; 6]> {
-    let legs = mech.actuated().map(|(_, leg)| leg::row(&leg::position(leg, pose)));
+    let legs = mech.actuated().map(|(_, leg)| leg::row(leg, &leg::position(leg, pose)));
     let idle = mech.idle.iter().map(|idle| idle::row(idle, pose));
     let constraints = mech.independent.iter().map(|c| constraint::row(c, pose));
     legs.chain(idle).chain(constraints).map(Wrench::array).collect()
@@ -38,7 +38,7 @@ pub fn jacobian(mech: &Mechanism, pose: &Pose<f64>) -> Vec<[f64; 6]> {
 /// H, layer by layer [Eq. 19].
 #[must_use]
 pub fn hessian(mech: &Mechanism, pose: &Pose<f64>) -> Vec<Hessian<f64>> {
-    let legs = mech.actuated().map(|(_, leg)| leg::hessian(&leg::position(leg, pose)));
+    let legs = mech.actuated().map(|(_, leg)| leg::hessian(leg, &leg::position(leg, pose)));
     let idle = mech.idle.iter().map(|_| [[0.0; 6]; 6]);
     legs.chain(idle).chain(mech.independent.iter().map(|c| constraint::hessian(c, pose))).collect()
 }
@@ -46,7 +46,7 @@ pub fn hessian(mech: &Mechanism, pose: &Pose<f64>) -> Vec<Hessian<f64>> {
 /// J in pure numbers \[T30\].
 #[must_use]
 pub fn pure_rows(mech: &Mechanism, pose: &Pose<f64>, scale: f64) -> Vec<[f64; 6]> {
-    let legs = mech.actuated().map(|(_, leg)| pure_row(leg::row(&leg::position(leg, pose)), scale));
+    let legs = mech.actuated().map(|(_, leg)| pure_row(leg::row(leg, &leg::position(leg, pose)), scale));
     let idle = mech.idle.iter().map(|idle| idle_row(idle, pose, scale));
     legs.chain(idle).chain(mech.independent.iter().map(|c| constraint_row(c, pose, scale))).collect()
 }
@@ -322,7 +322,7 @@ fn answered(
     for (i, leg) in mech.legs.iter().enumerate() {
         sum = sum + derivatives::with_leg(mech, i, leg, varied, forces, &mut row);
         if leg.actuated {
-            of_legs.push(leg::row(&leg::position(leg, &varied.pose)).power(&y).d);
+            of_legs.push(leg::row(leg, &leg::position(leg, &varied.pose)).power(&y).d);
         }
     }
     let idle = mech.idle.iter().map(|idle| idle::row(idle, &varied.pose));
@@ -353,7 +353,7 @@ pub(crate) fn by_geometry(
     add(&mut column, &combined(by_motion, &step));
     let moving = derivatives::along(&at.platform, &step);
     for (length, leg) in lengths.iter_mut().zip(&varied.mech.legs) {
-        *length = leg::position(leg, &moving.pose).length.d;
+        *length = leg::position(leg, &moving.pose).coordinate.d;
     }
     column
 }

@@ -3,7 +3,7 @@
 
 use crate::idle;
 use crate::lanes::{Lanes, any};
-use crate::mechanism::Mechanism;
+use crate::mechanism::{Drive, Mechanism};
 use crate::orthogonal::Orthogonal;
 use crate::reactions::{
     Given, Joint, Place, constraint_wrench, pure, put_places, put_reactions, put_unbalanced,
@@ -96,11 +96,15 @@ impl<V: Lanes> LegBalance<V> {
 
     /// A joint carries nothing where it is free: no power along its motion there, seen at b \[T44\].
     #[inline(always)]
-    fn solve(&mut self, places: &[Place<V>], [cylinder, piston]: [Wrench<V>; 2], length: f64) {
+    fn solve(&mut self, drive: Drive, places: &[Place<V>], [first, second]: [Wrench<V>; 2], length: f64) {
         let end = places[2].point;
-        let zero = Wrench::zero();
-        let given =
-            [pure(piston.moved(end - places[0].point) + cylinder, length), pure(piston, length), zero];
+        // What is given above the joint, at its point.
+        let at_base = second.moved(end - places[0].point);
+        let both = pure(at_base + first, length);
+        let given = match drive {
+            Drive::Telescope => [both, pure(second, length), Wrench::zero()],
+            Drive::Slider { .. } => [pure(at_base, length), both, Wrench::zero()],
+        };
         let mut rhs = [V::zero(); 6];
         for row in 0..self.free.len() {
             let (j, k) = self.free[row];
@@ -263,7 +267,7 @@ impl<'a, V: Lanes> Solver<'a, V> {
             let below = rods + 3 * i;
             let [cylinder, piston] = self.given.legs[i];
             let leg = &mut self.legs[i];
-            leg.solve(&self.places[below..below + 3], self.given.legs[i], length);
+            leg.solve(mech.legs[i].drive, &self.places[below..below + 3], self.given.legs[i], length);
             let (base, end) = (self.places[below].point, self.places[below + 2].point);
             let e = (end - o).scale(pure_lever);
             let particular = leg.particular.moved(e).array();

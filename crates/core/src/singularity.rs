@@ -8,7 +8,7 @@ use crate::idle::{self, Idle};
 use crate::jacobian::Matrix6;
 use crate::leg;
 use crate::linear;
-use crate::mechanism::{Constraint, Mechanism};
+use crate::mechanism::{Constraint, Leg, Mechanism};
 use crate::real::{Dual, Ordered, Real};
 use crate::redundant;
 use crate::spatial::{Pose, Twist, Vec3, Wrench};
@@ -29,10 +29,11 @@ pub enum Kind {
     LegFrame = 4,
     Actuation = 5,
     DependentRows = 6,
+    StrutAcrossRail = 7,
 }
 
 impl Kind {
-    pub const ALL: [Kind; 7] = [
+    pub const ALL: [Kind; 8] = [
         Kind::None,
         Kind::LegLength,
         Kind::ConstraintVanishes,
@@ -40,6 +41,7 @@ impl Kind {
         Kind::LegFrame,
         Kind::Actuation,
         Kind::DependentRows,
+        Kind::StrutAcrossRail,
     ];
 
     #[must_use]
@@ -48,6 +50,10 @@ impl Kind {
             Kind::None => "no singularity",
             Kind::LegLength => {
                 "inverse singularity: a leg has no length, so it has no direction, and its actuator moves nothing"
+            }
+            Kind::StrutAcrossRail => {
+                "inverse singularity: the strut of a slider is square to its rail, so that its carriage moves the platform no \
+                 longer, and two branches meet"
             }
             Kind::ConstraintVanishes => {
                 "constraint singularity: the wrench of a constraint vanishes (c = τ = 0, as where L ∥ l and r ∥ L), and the \
@@ -92,6 +98,8 @@ pub struct Singularity {
     /// Length of each leg by the scale, and sine of the angle between it and the axis that its frame hangs on.
     pub leg_length: Vec<f64>,
     pub leg_sine: Vec<f64>,
+    /// Cosine of the angle between each leg and its prismatic joint: one for telescopic legs \[T68\].
+    pub transmission: Vec<f64>,
     pub kind: Kind,
     /// The leg that the kind speaks of.
     pub leg: Option<usize>,
@@ -132,7 +140,7 @@ pub fn pure_jacobian<T: Real>(mech: &Mechanism, pose: &Pose<T>, scale: f64) -> M
     let (mut rows, mut count) = ([[T::zero(); 6]; 6], 0);
     for leg in &mech.legs {
         if leg.actuated {
-            rows[count] = pure_row(leg::row(&leg::position(leg, pose)), scale);
+            rows[count] = pure_row(leg::row(leg, &leg::position(leg, pose)), scale);
             count += 1;
         }
     }
@@ -159,7 +167,7 @@ fn gram<T: Real>(mech: &Mechanism, pose: &Pose<T>, scale: f64) -> Matrix6<T> {
     let mut sum = [[T::zero(); 6]; 6];
     for leg in &mech.legs {
         if leg.actuated {
-            add_square(&mut sum, &pure_row(leg::row(&leg::position(leg, pose)), scale));
+            add_square(&mut sum, &pure_row(leg::row(leg, &leg::position(leg, pose)), scale));
         }
     }
     for idle in &mech.idle {
@@ -279,13 +287,15 @@ fn without_idle(mech: &Mechanism, pose: &Pose<f64>, scale: f64, basis: DMatrix<f
 /// allowed twist of the smallest \[T24\] \[T31\].
 fn leg_values(mech: &Mechanism, pose: &Pose<f64>, scale: f64, allowed: &Allowed) -> (Vec<f64>, Twist<f64>) {
     let freedoms = allowed.basis.nrows();
-    let has_direction = |leg: &leg::Position<f64>| leg.length > TOLERANCE * scale;
-    let legs: Vec<_> = mech.actuated().map(|(_, leg)| leg::position(leg, pose)).collect();
+    let has_row = |(leg, p): &(&Leg, leg::Position<f64>)| {
+        p.length > TOLERANCE * scale && leg::transmission(leg, p).abs() > TOLERANCE
+    };
+    let legs: Vec<_> = mech.actuated().map(|(_, leg)| (leg, leg::position(leg, pose))).collect();
     let nothing = (vec![f64::NAN; freedoms], Twist::from_array([f64::NAN; 6]));
-    if !legs.iter().all(has_direction) {
+    if !legs.iter().all(has_row) {
         return nothing;
     }
-    let rows: Vec<[f64; 6]> = legs.iter().map(|p| pure_row(leg::row(p), scale)).collect();
+    let rows: Vec<[f64; 6]> = legs.iter().map(|(leg, p)| pure_row(leg::row(leg, p), scale)).collect();
     let legs = DMatrix::from_fn(rows.len(), 6, |i, j| rows[i][j]);
     // Where a constraint is lost there are fewer legs than freedoms, so that the last values are zero.
     let Some(svd) = Svd::of(&(legs * allowed.basis.transpose())) else { return nothing };
@@ -315,6 +325,9 @@ pub fn singularity(mech: &Mechanism, pose: &Pose<f64>, scale: f64, tolerance: f6
     let leg_length: Vec<f64> = positions.iter().map(|p| p.length / scale).collect();
     let leg_sine: Vec<f64> =
         mech.legs.iter().zip(&positions).map(|(leg, p)| leg::frame(leg, pose, p).sine).collect();
+    let transmission: Vec<f64> =
+        mech.legs.iter().zip(&positions).map(|(leg, p)| leg::transmission(leg, p)).collect();
+    let across: Vec<f64> = transmission.iter().map(|t| t.abs()).collect();
     let allowed = allowed(mech, pose, scale, tolerance);
     let (sigma, twist) = leg_values(mech, pose, scale, &allowed);
     let conditioning = values_of(&sigma);
@@ -325,6 +338,8 @@ pub fn singularity(mech: &Mechanism, pose: &Pose<f64>, scale: f64, tolerance: f6
     let vanishing = mech.constraints.iter().find(|c| row_size(c) <= tolerance);
     let (kind, leg) = if let Some(leg) = first_zero(&leg_length, tolerance.max(TOLERANCE)) {
         (Kind::LegLength, Some(leg))
+    } else if let Some(leg) = first_zero(&across, tolerance.max(TOLERANCE)) {
+        (Kind::StrutAcrossRail, Some(leg))
     } else if let (true, Some(c)) = (allowed.lost, vanishing) {
         (Kind::ConstraintVanishes, Some(c.leg))
     } else if allowed.lost {
@@ -344,6 +359,7 @@ pub fn singularity(mech: &Mechanism, pose: &Pose<f64>, scale: f64, tolerance: f6
         constraint_sigma: allowed.sigma,
         leg_length,
         leg_sine,
+        transmission,
         kind,
         leg,
         uncontrolled: sigma.iter().filter(|&&s| s <= tolerance).count(),

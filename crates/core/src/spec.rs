@@ -85,11 +85,36 @@ pub struct BodySpec {
     pub inertia: [[f64; 3]; 3],
 }
 
+/// The rail of a leg that slides: its foot moves along `axis` (base axes) from the base point, and its strut keeps its
+/// length.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SliderSpec {
+    pub axis: Vec3<f64>,
+    /// Of the strut, m.
+    pub strut: f64,
+    /// The side to which the strut leans: the sign of its direction along the axis.
+    pub branch: f64,
+    pub carriage: Option<CarriageSpec>,
+}
+
+/// What slides on a rail and does not turn: its mass, and the mass centre from the base joint, base axes.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CarriageSpec {
+    pub mass: f64,
+    pub center: Vec3<f64>,
+}
+
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct LegSpec {
     pub name: String,
     pub actuated: bool,
+    /// None for a telescopic leg.
+    #[serde(default)]
+    pub slider: Option<SliderSpec>,
+    /// Least and greatest length, or place of the carriage on its rail, m.
     pub stroke: Option<[f64; 2]>,
     pub radius: Option<f64>,
     /// Least and greatest active force, N.
@@ -97,7 +122,18 @@ pub struct LegSpec {
     pub base: JointSpec,
     pub platform: JointSpec,
     pub cylinder: Option<BodySpec>,
+    /// Of a slider: the strut.
     pub piston: Option<BodySpec>,
+}
+
+impl LegSpec {
+    /// The bodies that turn with the leg, and their keys in the file.
+    fn turning_bodies(&self) -> Vec<(&'static str, Option<&BodySpec>)> {
+        match self.slider {
+            None => vec![("cylinder", self.cylinder.as_ref()), ("piston", self.piston.as_ref())],
+            Some(_) => vec![("strut", self.piston.as_ref())],
+        }
+    }
 }
 
 #[derive(Clone, Debug, Deserialize)]
@@ -233,6 +269,9 @@ impl Spec {
             if leg.platform.rod.is_some() {
                 faults.add(format!("{place}.platform.rod"), "a rod carries base joints only");
             }
+            if let Some(slider) = &leg.slider {
+                faults.axis(&format!("{place}.slider.axis"), slider.axis);
+            }
         }
         faults.0
     }
@@ -283,13 +322,19 @@ impl Faults {
             }
             self.range(&format!("{place}.{side}"), joint.range.filter(|_| angles_known));
         }
-        if let Some([min, max]) = leg.stroke
-            && !(min >= 0.0 && min < max && max.is_finite())
-        {
-            self.add(
-                format!("{place}.stroke"),
-                format!("min is {min} m, max is {max} m; needs 0 <= min < max"),
-            );
+        if let Some([min, max]) = leg.stroke {
+            // A carriage may be on either side of its rail's point; a length is none below zero.
+            let (least, need) = match leg.slider {
+                None => (0.0, "0 <= min < max"),
+                Some(_) => (f64::MIN, "min < max"),
+            };
+            if !(min >= least && min < max && max.is_finite()) {
+                let message = format!("min is {min} m, max is {max} m; needs {need}");
+                self.add(format!("{place}.stroke"), message);
+            }
+        }
+        if let Some(slider) = &leg.slider {
+            self.slider(place, slider);
         }
         if let Some(radius) = leg.radius
             && !(radius > 0.0 && radius.is_finite())
@@ -304,17 +349,43 @@ impl Faults {
         if leg.force.is_some() && !leg.actuated {
             self.add(format!("{place}.force"), "must not be given; a passive leg has no active force");
         }
-        self.body(&format!("{place}.cylinder"), leg.cylinder.as_ref());
-        self.body(&format!("{place}.piston"), leg.piston.as_ref());
+        for (part, body) in leg.turning_bodies() {
+            self.body(&format!("{place}.{part}"), body);
+        }
         if leg.base.joint == JointKind::Spherical && leg.platform.joint == JointKind::Spherical {
-            for (part, body) in [("cylinder", &leg.cylinder), ("piston", &leg.piston)] {
-                if body.as_ref().is_some_and(|b| !symmetric_about_leg(b)) {
+            for (part, body) in leg.turning_bodies() {
+                if body.is_some_and(|b| !symmetric_about_leg(b)) {
                     self.add(
                         format!("{place}.{part}"),
                         "a leg with S at both ends spins freely, so its bodies must be symmetric about the leg: mass \
                          centre on it, inertia [[a, 0, 0], [0, b, 0], [0, 0, a]]",
                     );
                 }
+            }
+        }
+    }
+
+    /// Strut and carriage of a slider; its axis is one of the parts.
+    fn slider(&mut self, place: &str, slider: &SliderSpec) {
+        if !(slider.strut > 0.0 && slider.strut.is_finite()) {
+            self.add(format!("{place}.slider.strut"), format!("is {} m; must be positive", slider.strut));
+        }
+        if slider.branch.abs() != 1.0 {
+            let message = format!(
+                "is {}; must be 1 where the strut leans forward along the axis, seen from the carriage, or -1 where it \
+                 leans back",
+                slider.branch
+            );
+            self.add(format!("{place}.slider.branch"), message);
+        }
+        if let Some(carriage) = &slider.carriage {
+            self.finite3(&format!("{place}.carriage.center"), carriage.center);
+            if !(carriage.mass > 0.0 && carriage.mass.is_finite()) {
+                let message = format!(
+                    "is {} kg; must be positive (leave the carriage out to have none)",
+                    carriage.mass
+                );
+                self.add(format!("{place}.carriage.mass"), message);
             }
         }
     }

@@ -28,12 +28,16 @@ pub enum Status {
     ModeJump = 10,
     /// A revolute joint or a rod turns beyond its range; the numbers stand.
     OutOfAngle = 11,
+    /// The strut of a slider is too short to reach its rail.
+    OutOfReach = 12,
+    /// The pose has the coordinates of its legs, but the strut of a slider leans to the other side; the pose stands.
+    OtherBranch = 13,
     /// The legs contradict one another: nothing has all that is asked of them.
-    Inconsistent = 12,
+    Inconsistent = 14,
 }
 
 impl Status {
-    pub const ALL: [Status; 13] = [
+    pub const ALL: [Status; 15] = [
         Status::Ok,
         Status::NoBranch,
         Status::Fold,
@@ -46,6 +50,8 @@ impl Status {
         Status::OutOfCone,
         Status::ModeJump,
         Status::OutOfAngle,
+        Status::OutOfReach,
+        Status::OtherBranch,
         Status::Inconsistent,
     ];
 
@@ -96,6 +102,13 @@ impl Status {
             }
             Status::OutOfAngle => {
                 "a revolute joint or a rod turns beyond its range; the numbers stand, the machine cannot reach the pose"
+            }
+            Status::OutOfReach => {
+                "the strut of a slider is too short: from this pose it reaches its rail nowhere"
+            }
+            Status::OtherBranch => {
+                "the pose has the coordinates of its legs, but the strut of a slider leans to the other side of the square to \
+                 its rail than its branch says; give a guess nearer to the pose that is meant"
             }
             Status::Inconsistent => {
                 "the legs contradict one another: no pose nearby has all these lengths, or no motion all these rates or \

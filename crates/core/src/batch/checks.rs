@@ -4,9 +4,9 @@ use super::block::{self, At, Codes};
 use crate::constraint;
 use crate::forward_dynamics::square;
 use crate::lanes::{self, Lanes, Row, Task, WIDTH};
-use crate::leg;
+use crate::leg::{self, Position};
 use crate::limits::{Limit, Seen};
-use crate::mechanism::{Constraint, Leg, Mechanism, Turning};
+use crate::mechanism::{Constraint, Drive, Leg, Mechanism, Turning};
 use crate::real::{Ordered, Real};
 use crate::spatial::{Mat3, Motion, Pose, Twist, Vec3};
 use crate::status::Status;
@@ -87,28 +87,49 @@ pub(super) fn with_legs<V: Lanes>(mech: &Mechanism, pose: &Pose<V>, mut codes: C
     for leg in &mech.legs {
         let p = leg::position(leg, pose);
         let normal = leg::normal(leg, pose, &p);
-        codes = with_leg(mech, leg, p.length, normal.dot(normal), codes);
+        codes = with_leg(mech, leg, &p, normal.dot(normal), codes);
     }
     codes
 }
 
-/// The same of one leg, from its length and |N|² \[T5\].
+/// The same of one leg, from |N|² \[T5\]; and whether the strut of a slider reaches its rail, not square to it \[T67\].
 #[inline(always)]
 pub(super) fn with_leg<V: Lanes>(
     mech: &Mechanism,
     leg: &Leg,
-    length: V,
+    p: &Position<V>,
     normal: V,
     codes: Codes<V>,
 ) -> Codes<V> {
-    let codes =
-        codes.unless(length.greater(V::lit(LEG_TOLERANCE * mech.characteristic_length)), Status::Singular);
+    let codes = match leg.drive {
+        Drive::Telescope => {
+            let least = V::lit(LEG_TOLERANCE * mech.characteristic_length);
+            codes.unless(p.length.greater(least), Status::Singular)
+        }
+        Drive::Slider { .. } => {
+            let leans = leg::transmission(leg, p).abs();
+            codes
+                .unless(finite(&[p.coordinate]), Status::OutOfReach)
+                .unless(leans.greater(V::lit(LEG_TOLERANCE)), Status::Singular)
+        }
+    };
     match leg.turning {
         Turning::Across(..) => {
             codes.unless(normal.greater(V::lit(LEG_TOLERANCE * LEG_TOLERANCE)), Status::Singular)
         }
         Turning::Along(..) | Turning::Free(_) => codes,
     }
+}
+
+/// Whether the struts of all sliders reach their rails.
+#[inline(always)]
+pub(super) fn reached<V: Lanes>(mech: &Mechanism, pose: &Pose<V>, mut codes: Codes<V>) -> Codes<V> {
+    for leg in &mech.legs {
+        if let Drive::Slider { .. } = leg.drive {
+            codes = codes.unless(finite(&[leg::position(leg, pose).coordinate]), Status::OutOfReach);
+        }
+    }
+    codes
 }
 
 pub(super) fn check_legs(mech: &Mechanism, pose: &Pose<f64>) -> Status {

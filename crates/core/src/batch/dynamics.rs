@@ -79,7 +79,7 @@ impl Operation<3> for InverseDynamics<'_> {
         for (k, leg) in mech.legs.iter().enumerate() {
             let place = leg::place(leg, pose);
             let (p, f) = &place;
-            legs = with_leg(mech, leg, p.length, f.sine * f.sine, legs);
+            legs = with_leg(mech, leg, p, f.sine * f.sine, legs);
             seen.next(p);
             balance.add(mech, k, leg, &place, &platform);
         }
@@ -195,7 +195,7 @@ impl Operation<9> for Power<'_> {
         let (mut actuators, mut row) = (V::zero(), 0);
         for leg in &mech.legs {
             if leg.actuated {
-                actuators = actuators + leg::row(&leg::position(leg, pose)).power(twist) * f[row];
+                actuators = actuators + leg::row(leg, &leg::position(leg, pose)).power(twist) * f[row];
                 row += 1;
             }
         }

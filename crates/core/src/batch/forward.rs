@@ -3,14 +3,15 @@
 use super::Table;
 use super::block::{self, Codes, Pieces, Rows};
 use super::checks::{actuated_values, is_rotation, joint_limits, raw_pose, then, with_legs};
-use crate::forward::{self, Found};
-use crate::forward_lanes::{Poses, forward_kinematics_of, load, load_squares, put, put_squares};
+use crate::forward::{self, Asked, Found};
+use crate::forward_lanes::{Poses, forward_kinematics_of, load, load_asked, put, put_numbers};
 use crate::lanes::{self, Lanes, Row, Task, WIDTH};
 use crate::least;
+use crate::leg;
 use crate::limits::Seen;
-use crate::mechanism::Mechanism;
+use crate::mechanism::{Drive, Mechanism};
 use crate::modes::{self, Start};
-use crate::spatial::Pose;
+use crate::spatial::{Pose, Vec3};
 use crate::status::Status;
 
 /// The pose for each set of lengths of all legs (those of passive legs are not read), in the assembly mode of its
@@ -121,7 +122,8 @@ fn put_found(rows: &mut Rows<'_, 3>, i: usize, found: &Found, status: Status) {
 fn check_found(mech: &Mechanism, asked: &[f64], pose: &Pose<f64>) -> Status {
     if mech.is_redundant() {
         let missed = least::error(mech, asked, pose);
-        return within_limits_missed::<f64>(mech, pose, missed).status();
+        let codes = with_legs(mech, pose, Codes::<f64>::ok());
+        return within_limits_missed(mech, pose, missed, codes).status();
     }
     block::read(checks(mech, [(asked, pose)])[0]).0
 }
@@ -131,16 +133,16 @@ fn checks<'a>(mech: &Mechanism, found: impl IntoIterator<Item = (&'a [f64], &'a 
     let (mut poses, mut to, mut codes) = ([[0.0; WIDTH]; 12], [[0.0; WIDTH]; 6], [0.0; WIDTH]);
     for (k, (asked, pose)) in found.into_iter().enumerate() {
         put(&mut poses, k, pose);
-        put_squares(&mut to, k, asked);
+        put_numbers(mech, &mut to, k, asked);
     }
-    lanes::dispatch(Checks { mech, poses: &poses, squares: &to, codes: &mut codes });
+    lanes::dispatch(Checks { mech, poses: &poses, numbers: &to, codes: &mut codes });
     codes
 }
 
 struct Checks<'a> {
     mech: &'a Mechanism,
     poses: &'a Poses,
-    squares: &'a [Row; 6],
+    numbers: &'a [Row; 6],
     codes: &'a mut Row,
 }
 
@@ -152,8 +154,10 @@ impl Task for Checks<'_> {
         let (mech, mut k) = (self.mech, 0);
         while k < WIDTH {
             let pose = load::<V>(self.poses, k);
-            let missed = forward::error(mech, &load_squares(self.squares, k), &pose);
-            within_limits_missed(mech, &pose, missed).store(&mut self.codes[k..]);
+            let asked = load_asked(mech, self.numbers, k);
+            let missed = forward::error(mech, &asked, &pose);
+            let codes = on_branch(mech, &asked, &pose, with_legs(mech, &pose, Codes::ok()));
+            within_limits_missed(mech, &pose, missed, codes).store(&mut self.codes[k..]);
             k += V::WIDTH;
         }
     }
@@ -161,8 +165,12 @@ impl Task for Checks<'_> {
 
 /// The first limit of a joint that a pose breaks which may miss lengths by so much.
 #[inline(always)]
-fn within_limits_missed<V: Lanes>(mech: &Mechanism, pose: &Pose<V>, missed: V) -> Codes<V> {
-    let mut codes = with_legs(mech, pose, Codes::ok());
+fn within_limits_missed<V: Lanes>(
+    mech: &Mechanism,
+    pose: &Pose<V>,
+    missed: V,
+    mut codes: Codes<V>,
+) -> Codes<V> {
     let mut seen = Seen::default();
     for limit in joint_limits(mech) {
         let mut margin = limit.bound.margin(limit.of_joint(mech, pose, &mut seen));
@@ -170,6 +178,29 @@ fn within_limits_missed<V: Lanes>(mech: &Mechanism, pose: &Pose<V>, missed: V) -
             margin = margin + missed;
         }
         codes = codes.unless(V::zero().at_most(margin), limit.status());
+    }
+    codes
+}
+
+/// Whether the struts of all actuated sliders lean to the sides that their branches say: only then are the coordinates that
+/// were asked for those of the pose \[T69\].
+#[inline(always)]
+fn on_branch<V: Lanes>(
+    mech: &Mechanism,
+    asked: &[Asked<V>; 6],
+    pose: &Pose<V>,
+    mut codes: Codes<V>,
+) -> Codes<V> {
+    let mut count = 0;
+    for leg in &mech.legs {
+        if let Drive::Slider { rail, branch, .. } = leg.drive
+            && leg.actuated
+        {
+            let r = asked[count].vector(leg, leg::vectors(leg, pose).1);
+            let leans = r.dot(Vec3::lift(rail)).scale(branch);
+            codes = codes.unless(leans.greater(V::zero()), Status::OtherBranch);
+        }
+        count += usize::from(leg.actuated);
     }
     codes
 }

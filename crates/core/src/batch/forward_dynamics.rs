@@ -148,7 +148,7 @@ fn put(
         }
     }
     for (k, leg) in mech.legs.iter().enumerate() {
-        let row = leg::row(&leg::position(leg, pose));
+        let row = leg::row(leg, &leg::position(leg, pose));
         for (j, twist) in e.twists[..d].iter().enumerate() {
             rows.set(ids[5], i, k * d + j, &[row.power(twist)]);
         }

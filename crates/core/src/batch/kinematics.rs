@@ -36,9 +36,9 @@ impl Operation<3> for InverseKinematics<'_> {
         for (k, leg) in mech.legs.iter().enumerate() {
             let p = leg::position(leg, &pose);
             let normal = leg::normal(leg, &pose, &p);
-            codes = with_leg(mech, leg, p.length, normal.dot(normal), codes);
+            codes = with_leg(mech, leg, &p, normal.dot(normal), codes);
             seen.next(&p);
-            answers.put(lengths, k, [p.length]);
+            answers.put(lengths, k, [p.coordinate]);
             answers.put(vectors, k, p.r.array());
             answers.put(directions, k, p.delta.array());
         }
@@ -149,7 +149,7 @@ impl Operation<21> for Kinematics<'_> {
         for (k, (leg, zero)) in mech.legs.iter().zip(self.zeros).enumerate() {
             let state = leg::state(leg, &platform);
             let leg::State { position: p, end, turn, frame } = &state;
-            legs = with_leg(mech, leg, p.length, frame.sine * frame.sine, legs);
+            legs = with_leg(mech, leg, p, frame.sine * frame.sine, legs);
             seen.next(p);
             let (piston, cylinder) = (leg::piston(leg, &state), leg::cylinder(leg, &state));
             let [below, above] = joints::angles(leg, zero, &platform, &state);
@@ -176,7 +176,7 @@ impl Operation<21> for Kinematics<'_> {
                 rod_omega,
                 rod_eps,
             ] = Answers::fields();
-            answers.put(lengths, k, [p.length]);
+            answers.put(lengths, k, [p.coordinate]);
             answers.put(rates, k, [end.rate]);
             answers.put(accelerations, k, [end.acceleration]);
             answers.put(directions, k, p.delta.array());

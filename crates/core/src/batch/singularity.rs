@@ -1,7 +1,7 @@
 //! Singularities at many states.
 
 use super::block::{self, Answers, At, Codes, Operation, Pieces};
-use super::checks::{any_pose, finite, kept, read_pose};
+use super::checks::{any_pose, finite, kept, reached, read_pose};
 use super::{FieldId, Table};
 use crate::coordinates::{self, Set};
 use crate::lanes::Lanes;
@@ -14,7 +14,7 @@ use crate::status::Status;
 /// A pose that keeps the constraints, whether or not its legs have frames: a singular pose is one too.
 fn read(mech: &Mechanism, poses: &[f64], i: usize) -> (Pose<f64>, Status) {
     let (pose, codes) = any_pose(poses, At::one(i));
-    (pose, kept(mech, &pose, codes).status())
+    (pose, kept(mech, &pose, reached(mech, &pose, codes)).status())
 }
 
 /// Singular values of the leg Jacobian on the twists that the constraints allow, for the length `scale` \[T24\].
@@ -79,6 +79,7 @@ pub fn singularities(mech: &Mechanism, poses: &[f64], scale: f64, tolerance: f64
         ("constraint_sigma", vec![]),
         ("leg_length", vec![legs]),
         ("leg_sine", vec![legs]),
+        ("transmission", vec![legs]),
         ("kind", vec![]),
         ("leg", vec![]),
         ("uncontrolled", vec![]),
@@ -87,7 +88,7 @@ pub fn singularities(mech: &Mechanism, poses: &[f64], scale: f64, tolerance: f64
         ("pitch", vec![]),
         ("point", vec![3]),
     ];
-    let ids: [FieldId; 14] = block::fields();
+    let ids: [FieldId; 15] = block::fields();
     block::one_by_one(n, fields, Pieces::SLOW, |rows, i| {
         let (pose, status) = read(mech, poses, i);
         if status != Status::Ok {
@@ -96,7 +97,7 @@ pub fn singularities(mech: &Mechanism, poses: &[f64], scale: f64, tolerance: f64
         let s = singularity::singularity(mech, &pose, scale, tolerance);
         let status = known(s.determinant);
         let c = s.conditioning;
-        let values: [&[f64]; 14] = [
+        let values: [&[f64]; 15] = [
             &[s.determinant],
             &[c.sigma_min],
             &[c.sigma_max],
@@ -104,6 +105,7 @@ pub fn singularities(mech: &Mechanism, poses: &[f64], scale: f64, tolerance: f64
             &[s.constraint_sigma],
             &s.leg_length,
             &s.leg_sine,
+            &s.transmission,
             &[f64::from(s.kind as u8)],
             &[s.leg.map_or(-1.0, |leg| leg as f64)],
             &[if status == Status::Ok { s.uncontrolled as f64 } else { f64::NAN }],

@@ -1,7 +1,7 @@
 //! Steps from poses to other lengths, many side by side in lanes \[T41\], \[T65\]: where each leads to first order, and
 //! the way itself, followed to its end.
 
-use crate::forward::{step_of, system};
+use crate::forward::{Asked, step_of, system};
 use crate::forward_lanes::{
     ARRIVED, BEGINNING, GOING, Newton, Piece, Pieces, Poses, get, load, newton, put, store,
 };
@@ -139,7 +139,7 @@ impl Task for Prediction<'_> {
                 unit[i][i] = V::one();
             }
             // One elimination for all directions: only one length changes in each.
-            let columns = solve_all(system(mech, &pose, &[V::zero(); 6]).matrix, unit).x;
+            let columns = solve_all(system(mech, &pose, &[Asked::none(); 6]).matrix, unit).x;
             let arm = pose.rotation * Vec3::<V>::lift(MARKER * scale);
             for axis in 0..axes {
                 for direction in 0..2 {
