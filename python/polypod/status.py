@@ -26,6 +26,8 @@ class Status(IntEnum):
     OUT_OF_CONE = 9
     MODE_JUMP = 10
     OUT_OF_ANGLE = 11
+    OUT_OF_REACH = 12
+    OTHER_BRANCH = 13
 
     @property
     def has_answer(self) -> bool:
@@ -36,6 +38,7 @@ class Status(IntEnum):
             Status.OUT_OF_CONE,
             Status.OUT_OF_ANGLE,
             Status.MODE_JUMP,
+            Status.OTHER_BRANCH,
         )
 
     @property
