@@ -49,8 +49,8 @@ def body_name(mech: Mechanism, link: Link) -> str:
     match link.kind:
         case "rod":
             return rod_body(spec["rods"][link.index])
-        case "cylinder" | "piston":
-            return leg_bodies(spec["legs"][link.index])[link.kind == "piston"]
+        case "cylinder" | "piston" | "carriage" | "strut":
+            return leg_bodies(spec["legs"][link.index])[link.kind in ("piston", "strut")]
     return link.kind
 
 

@@ -82,7 +82,7 @@ class Machine:
                     smooth.faces,
                     color=rgb(piece.color),
                 )
-                if link.kind in ("cylinder", "piston") and piece.color == STEEL:
+                if link.kind in ("cylinder", "piston", "strut") and piece.color == STEEL:
                     self._legs[link.index].append(node)
                 elif piece.color == PLATFORM:
                     self._platform.append(node)
