@@ -174,7 +174,7 @@ class Slider(Table):
 
     axis: Axis
     strut: Number
-    branch: Literal[1, -1]
+    branch: Number
 
 
 class Stroke(Table):
@@ -350,6 +350,8 @@ def _leg(
     leg = read_table(Leg, data, place, faults)
     if leg is None:
         return None
+    if leg.slider is None and isinstance(data, dict) and "slider" in data:
+        return None  # its faults are known, and which links it may have is not
     for key in _LINKS_OF[leg.slider is None]:
         if getattr(leg, key) is not None:
             of = "a telescopic leg (one without slider)" if leg.slider is None else "a slider"
@@ -359,6 +361,7 @@ def _leg(
     platform = _joint(leg.platform, f"{place}.platform", None, units, faults)
     if base is None or platform is None:
         return None
+    above = leg.piston or leg.strut
     return {
         "name": str(number) if leg.name is None else leg.name,
         "actuated": leg.actuated,
@@ -369,8 +372,7 @@ def _leg(
         "base": base,
         "platform": platform,
         "cylinder": leg.cylinder and _link(leg.cylinder, +1, units),
-        # The link on the platform joint.
-        "piston": (leg.piston and _link(leg.piston, -1, units)) or (leg.strut and _link(leg.strut, -1, units)),
+        "piston": above and _link(above, -1, units),
     }
 
 
@@ -476,6 +478,9 @@ _TABLE_OF_KEY: dict[str, type[Table]] = {
     "platform": Joint,
     "cylinder": Link,
     "piston": Link,
+    "strut": Link,
+    "slider": Slider,
+    "carriage": Carriage,
 }
 _FORM_OF_KEY = {
     "point": "[x, y, z] or { radius, angle, z }",

@@ -210,6 +210,9 @@ fn check_leg_at_home(spec: &Spec, place: &str, leg: &LegSpec, home: &Pose<f64>) 
     let e = home.rotation * leg.platform.point;
     let mut r = home.o + e - leg.base.point;
     if let Some(slider) = &leg.slider {
+        if !(slider.axis.norm() > 0.0 && slider.strut > 0.0) {
+            return faults;
+        }
         faults.extend(check_slider(place, leg, slider));
         match strut_at_home(slider, r) {
             Ok(strut) => r = strut,

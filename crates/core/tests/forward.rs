@@ -2,9 +2,9 @@
 
 mod common;
 
-use common::{Draw, on_rod, published, states, with_leg};
+use common::{Draw, on_rod, published, six_sliders, states, with_leg};
 use polypod_core::coordinates::{MAX_COORDINATES, Set, Values};
-use polypod_core::forward::{error, forward_kinematics, polish, squares, step_of};
+use polypod_core::forward::{asked, error, forward_kinematics, polish, step_of};
 use polypod_core::jacobian::scaled_jacobian;
 use polypod_core::leg;
 use polypod_core::linear::solve;
@@ -14,7 +14,7 @@ use polypod_core::spatial::{Mat3, Pose};
 use polypod_core::status::Status;
 
 fn lengths(mech: &Mechanism, pose: &Pose<f64>) -> Vec<f64> {
-    mech.actuated().map(|(_, l)| leg::position(l, pose).length).collect()
+    mech.actuated().map(|(_, l)| leg::position(l, pose).coordinate).collect()
 }
 
 /// o in metres and turns in radians: largest difference.
@@ -52,7 +52,7 @@ fn continued(mech: &Mechanism, to: &[f64], guess: &Pose<f64>) -> Option<Pose<f64
         h = h.min(1.0 - t);
         let between: Vec<f64> =
             from.iter().zip(to).map(|(a, b)| (a * a + (t + h) * (b * b - a * a)).sqrt()).collect();
-        let next = polish(mech, &squares(&between), &pose);
+        let next = polish(mech, &asked(mech, &between), &pose);
         let close = apart(&next.pose, &pose) < 2e-3 && next.iterations < 6;
         if close && next.sign == sign(mech, guess) {
             (pose, t, h) = (next.pose, t + h, 1.5 * h);
@@ -85,7 +85,7 @@ fn a_round_trip_never_ends_silently_in_another_mode() {
         } else {
             // Then the guess lies in the mode that was found, and the pose it was made from in another one.
             others += 1;
-            assert!(error(&mech, &squares(&to), &found.pose) < 1e-13);
+            assert!(error(&mech, &asked(&mech, &to), &found.pose) < 1e-13);
             if let Some(end) = continued(&mech, &to, &guess) {
                 assert!(apart(&end, &found.pose) < 1e-6, "{q:?}");
             } else {
@@ -102,7 +102,7 @@ fn newton_converges_quadratically() {
     let mech = published();
     let set = Set::of(&mech)[1];
     let pose = set.pose(&mech, &[0.1, -0.3, 0.6, 0.8, 0.6, 0.0, 0.0]);
-    let target = squares(&lengths(&mech, &pose));
+    let target = asked(&mech, &lengths(&mech, &pose));
     let mut guess = set.pose(&mech, &[0.13, -0.28, 0.61, 0.77, 0.63, 0.0, 0.0]);
     let mut errors = vec![apart(&guess, &pose)];
     while errors.last().is_some_and(|e| *e > 1e-9) && errors.len() < 10 {
@@ -121,12 +121,13 @@ fn newton_converges_quadratically() {
 
 /// Every real pose that plain Newton iterations find from starts all over the space.
 fn many_starts(mech: &Mechanism, lengths: &[f64], starts: usize, draw: &mut Draw) -> Vec<Pose<f64>> {
-    let longest = lengths.iter().copied().fold(0.0, f64::max);
+    let home = mech.legs.iter().map(|l| leg::position(l, &mech.home).length);
+    let longest = home.chain(lengths.iter().copied()).fold(0.0, f64::max);
     let mut found: Vec<Pose<f64>> = Vec::new();
     for _ in 0..starts {
         let guess =
             Pose { rotation: Mat3::from_rotation_vector(draw.vector() * 2.0), o: draw.vector() * longest };
-        let f = polish(mech, &squares(lengths), &guess);
+        let f = polish(mech, &asked(mech, lengths), &guess);
         if f.status == Status::Ok && f.residual < 1e-12 && !found.iter().any(|p| apart(p, &f.pose) < 1e-7) {
             found.push(f.pose);
         }
@@ -172,7 +173,10 @@ fn compare_with_search(mech: &Mechanism, sets: usize, starts: usize) {
 fn all_modes_are_those_of_a_search_from_many_starts() {
     compare_with_search(&published(), 100, 400);
     compare_with_search(&with_leg("SPU", 3), 30, 400);
-    for mech in [with_leg("RPS", 3), with_leg("UPU", 3), on_rod(1, 3), on_rod(2, 4)] {
+    let sliders = [with_leg("PRS", 3), with_leg("PUU", 3), six_sliders()];
+    for mech in
+        [with_leg("RPS", 3), with_leg("UPU", 3), on_rod(1, 3), on_rod(2, 4)].into_iter().chain(sliders)
+    {
         compare_with_search(&mech, 20, 200);
     }
 }

@@ -38,14 +38,24 @@ pub fn every_leg() -> Vec<String> {
     letters.iter().flat_map(|base| letters.iter().map(move |platform| format!("{base}P{platform}"))).collect()
 }
 
-/// Every leg of the catalogue, rods with one to three legs, and the published manipulator.
+/// Every pair of joints that a slider can have.
+pub const SLIDERS: [&str; 6] = ["PSS", "PUS", "PSU", "PUU", "PRS", "PRU"];
+
+/// Every leg of the catalogue, rods with one to three legs, one slider of each kind, six of them, and the published
+/// manipulator.
 pub fn mechanisms() -> Vec<Mechanism> {
     every_leg()
         .iter()
         .enumerate()
         .map(|(i, letters)| with_leg(letters, i as u64 + 1))
         .chain([on_rod(1, 3), on_rod(2, 4), on_rod(3, 5), published()])
+        .chain(SLIDERS.iter().enumerate().map(|(i, letters)| with_leg(letters, i as u64 + 21)))
+        .chain([six_sliders()])
         .collect()
+}
+
+pub fn six_sliders() -> Mechanism {
+    generic("6-PUS", &vec!["PUS".to_owned(); 6], 0, 6, 31)
 }
 
 fn body(draw: &mut Draw, symmetric: bool) -> serde_json::Value {
@@ -86,6 +96,11 @@ fn joint(
     serde_json::json!({ "joint": letter, "point": point.array(), "axis": axis, "normal": normal, "rod": null, "cone": null })
 }
 
+/// The letters of a leg's joints on the base (or carriage) and on the platform.
+fn joints_of(letters: &str) -> [&str; 2] {
+    if letters.starts_with('P') { [&letters[1..2], &letters[2..]] } else { [&letters[..1], &letters[2..]] }
+}
+
 /// A mechanism with one leg of the given letters, made up with UPS legs, with generic bodies, load and damping.
 pub fn with_leg(letters: &str, seed: u64) -> Mechanism {
     let freedoms = |l: &str| match l {
@@ -94,7 +109,8 @@ pub fn with_leg(letters: &str, seed: u64) -> Mechanism {
         "R" => 1,
         _ => 0,
     };
-    let dof = (freedoms(&letters[..1]) + freedoms(&letters[2..]) + 1).min(6);
+    let [base, platform] = joints_of(letters);
+    let dof = (freedoms(base) + freedoms(platform) + 1).min(6);
     let mut legs = vec![letters.to_owned()];
     legs.resize(dof, "UPS".to_owned());
     generic(letters, &legs, 0, dof, seed)
@@ -117,7 +133,7 @@ fn generic(name: &str, letters: &[String], on_rod: usize, actuated: usize, seed:
     let (line, point) = ((Vec3::X + draw.vector() * 0.3).unit(), draw.vector() * 0.2);
     let mut legs = Vec::new();
     for (i, joints) in letters.iter().enumerate() {
-        let (base, platform) = (&joints[..1], &joints[2..]);
+        let [base, platform] = joints_of(joints);
         let stands_on_rod = i + on_rod >= letters.len();
         let (mut below, above) = (draw.vector() * 0.5, draw.vector() * 0.3);
         if stands_on_rod {
@@ -127,6 +143,20 @@ fn generic(name: &str, letters: &[String], on_rod: usize, actuated: usize, seed:
         let n = if stands_on_rod { line.cross(delta).unit() } else { delta.cross(draw.vector()).unit() };
         let symmetric = base == "S" && platform == "S";
         let tilts = [0.5 * draw.number(), 0.5 * draw.number()];
+        let slider = joints.starts_with('P').then(|| {
+            // The strut is long enough to be where it is, the carriage somewhere on the rail.
+            let side = n.cross(delta);
+            let axis = match (base, platform) {
+                ("R", _) => delta + side * 0.7,
+                ("U", "U") => delta * tilts[0].sin() + side * tilts[0].cos(),
+                _ => draw.vector(),
+            };
+            let strut = (home.0 + rotation * above - below).norm();
+            let branch = axis.dot(delta).signum();
+            below = below - axis.unit() * (0.3 * draw.number());
+            let carriage = serde_json::json!({ "mass": 3.0, "center": draw.vector().array() });
+            serde_json::json!({ "axis": axis.array(), "strut": strut, "branch": branch, "carriage": carriage })
+        });
         let mut below = joint(base, below, delta, n, tilts[0], &Mat3::identity());
         if stands_on_rod {
             below["rod"] = 0.into();
@@ -134,7 +164,7 @@ fn generic(name: &str, letters: &[String], on_rod: usize, actuated: usize, seed:
         }
         legs.push(serde_json::json!({
             "name": format!("{}", i + 1), "actuated": i < actuated, "stroke": null, "radius": null,
-            "base": below, "platform": joint(platform, above, delta, n, tilts[1], &rotation),
+            "slider": slider, "base": below, "platform": joint(platform, above, delta, n, tilts[1], &rotation),
             "cylinder": body(&mut draw, symmetric), "piston": body(&mut draw, symmetric),
         }));
     }
