@@ -144,7 +144,6 @@ class LinkPlaces:
         frames[lost] = np.nan
         return LinkFrames(frames, turn_known & ~lost, legs.status)
 
-
     def _leg_axes(self, joints: Array, legs: InverseKinematics) -> Array:
         """(..., n, 3, 3): (n, δ, n×δ) of all legs, from the axes of their joints (..., 3 n, 3, 3)."""
         # The prismatic joint of a telescopic leg has the axes of its leg.
@@ -206,7 +205,7 @@ class _Shapes:
         self._lay_rails(ways, middle, towards, ends.mean(axis=0))
 
     def _lay_rails(self, ways: dict[int, Array], joints: Array, towards: Array, center: Array) -> None:
-        """The base's plate and the rails on it: lying if all is in one plane, or standing on their lower ends."""
+        """The base's plate, and the rails: they lie on it if all are in one plane, else they stand."""
         still = [i for i in range(len(joints)) if i not in ways]
         stands = np.concatenate([self._base[still], *ways.values()])
         plane = flat_normal(stands) if ways else None

@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 NOMINAL_WAY = 0.6
 """How far a rail is drawn to each side of home where the file gives no stroke, by the length of the strut."""
 FLAT = 0.05
-"""Rails lie on a plate if their ends leave its plane by less than this part of their width; else they stand."""
+"""Rails lie on a plate if their ends leave its plane by less than this part of their width."""
 GAP, SHOE, OVERHANG = 2.9, 2.4, 2.0
 """By the radius of the strut: from joint to rail, width of the carriage's block, and its half length."""
 
@@ -42,7 +42,8 @@ class Rail(NamedTuple):
 
     def bar(self) -> Trimesh:
         """What the carriage slides on."""
-        return beam(*self.bar_ends(), 1.1 * self.radius, self.back)
+        start, end = self.bar_ends()
+        return beam(start, end, 1.1 * self.radius, self.back)
 
     def shoe(self) -> Trimesh:
         """The carriage's block about the rail, with the joint at the origin."""
@@ -56,7 +57,7 @@ class Rail(NamedTuple):
 
 
 def way(leg: Mapping[str, Any], home: float) -> Array:
-    """(2, 3): the ends of a carriage's way on its rail, base axes, m; `home` is its place at the centre pose."""
+    """(2, 3): the ends of a carriage's way, base axes, m; `home` is its place at the centre pose."""
     axis, stroke = unit(leg["slider"]["axis"]), leg["stroke"]
     if stroke is None:
         half = NOMINAL_WAY * leg["slider"]["strut"]

@@ -55,7 +55,7 @@ def _drawn_out(cylinder: Link, place: Array, corners: Array) -> tuple[Array, NDA
 
 
 def _bared(axis: Array, shoe: Array, corners: Array) -> tuple[Array, NDArray[np.bool_]]:
-    """A rail's faces (k, 4, 3) ended at the block that runs on it, with the corners `shoe` (m, 3); and which are left."""
+    """A rail's faces (k, 4, 3) but for what is in the block with corners `shoe` (m, 3); and which are left."""
     low, high = (shoe @ axis).min(), (shoe @ axis).max()
     at = corners @ axis
     within = (low < at) & (at < high)
@@ -134,7 +134,9 @@ class Scene:
         sides = [leg[side]["joint"] for leg in spec["legs"] for side in ("base", "platform")]
         self.kinds = dict.fromkeys(sides)  # joint kinds in use, in order
         self._rail_axes = {
-            f"rail {leg['name']}": unit(leg["slider"]["axis"]) for leg in spec["legs"] if leg["slider"] is not None
+            f"rail {leg['name']}": unit(leg["slider"]["axis"])
+            for leg in spec["legs"]
+            if leg["slider"] is not None
         }
         self._size, thick = mech.characteristic_length, max(leg_radii(mech))
         self._add_links(links_of(mech), link_frames(mech, pose).frames)
@@ -165,9 +167,11 @@ class Scene:
         return [*self.labels, *((label.place(right, up), label.text) for label in self.joint_labels)]
 
     def _add_links(self, links: tuple[Link, ...], frames: Array) -> None:
-        """All links; but nothing inside a barrel or a carriage, which faces sorted by their depth would not hide."""
+        """All links; but nothing inside a barrel or a carriage: faces sorted by depth would not hide it."""
         shoes = {
-            f"rail {link.name.removeprefix('carriage ')}": _moved(np.array(link.pieces[0].mesh.vertices), place)
+            f"rail {link.name.removeprefix('carriage ')}": _moved(
+                np.array(link.pieces[0].mesh.vertices), place
+            )
             for link, place in zip(links, frames, strict=True)
             if link.kind == "carriage" and np.isfinite(place).all()
         }

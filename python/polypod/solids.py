@@ -125,7 +125,9 @@ def beam(start: ArrayLike, end: ArrayLike, width: float, side: ArrayLike) -> Tri
     mesh = tube((0.0, 0.0, 0.0), (0.0, 0.0, length), width / np.sqrt(2), sides=4)
     place = np.eye(4)
     # Its edges are at the first and second axis.
-    place[:3, :3] = np.column_stack([(side - other) / np.sqrt(2), (side + other) / np.sqrt(2), along / length])
+    place[:3, :3] = np.column_stack(
+        [(side - other) / np.sqrt(2), (side + other) / np.sqrt(2), along / length]
+    )
     place[:3, 3] = start
     mesh.apply_transform(place)
     return mesh

@@ -110,7 +110,7 @@ def _bytes(scene: Any, **options: Any) -> bytes:
 
 
 def _parents(mech: Mechanism, links: tuple[Link, ...]) -> list[int | None]:
-    """The link that each hangs on: rods on the base, legs on base or rod, pistons on cylinders, struts on carriages."""
+    """The link that each hangs on: of a leg the second on the first, that on its rod or on the base."""
     index = {(link.kind, link.index): i for i, link in enumerate(links)}
     found: list[int | None] = []
     for link in links:
@@ -123,8 +123,7 @@ def _parents(mech: Mechanism, links: tuple[Link, ...]) -> list[int | None]:
                 rod = mech.geometry["legs"][link.index]["base"]["rod"]
                 found.append(index["base", 0] if rod is None else index["rod", rod])
             case "piston" | "strut":
-                below = "cylinder" if link.kind == "piston" else "carriage"
-                found.append(index[below, link.index])
+                found.append(index["cylinder" if link.kind == "piston" else "carriage", link.index])
     return found
 
 

@@ -107,7 +107,7 @@ def _brief(values: Any) -> str:
 
 
 def _add_motors(made: Skeleton, model: Model) -> None:
-    """A motor along each actuated leg or its rail: its control is the active force, N, positive when it pushes."""
+    """A motor along each actuated leg or its rail: its control is the active force, N."""
     motors = ElementTree.SubElement(made.root, "actuator")
     bodies = {body.name: body for body in model.tree.bodies}
     for i, leg in enumerate(model.tree.legs):

@@ -106,7 +106,9 @@ class Model:
             "Units: m, kg, s, rad. A leg's links have the axes (n, delta, n x delta) at B and at b.",
         ]
         if any(leg.rail is not None for leg in self.tree.legs):
-            facts.append("Carriages have the base's axes, struts (n, delta, n x delta), both at the base joint.")
+            facts.append(
+                "Carriages have the base's axes, struts (n, delta, n x delta), both at the base joint."
+            )
         renamed = [f"{given} is {name}" for given, name in self.names.changed("link").items()]
         if renamed:
             facts.append(f"Names: {'; '.join(renamed)}.")

@@ -1,8 +1,7 @@
 """Where the links of a mechanism are at a pose of the platform, from points and axes alone.
 
-A leg's frame is (n, δ, n×δ), as the mechanism file's format defines it; a rod's is (L, n, L×n), and a carriage,
-which does not turn, has the base's. A cylinder, a carriage and a strut have their origin at the base joint, a
-piston at the platform joint.
+A leg's frame is (n, δ, n×δ), as the mechanism file's format defines it; a rod's is (L, n, L×n). A carriage,
+which does not turn, has the base's. The origin is at the base joint, of a piston at the platform joint.
 """
 
 from __future__ import annotations
@@ -83,13 +82,13 @@ def placements(geometry: Mapping[str, Any], pose: Array, *, zero: bool = False) 
                 n = first
         delta = unit(delta - n * (n @ delta))
         axes = np.column_stack([n, delta, cross(n, delta)])
-        first, second = leg_bodies(leg)
+        lower, upper = leg_bodies(leg)
         if leg["slider"] is None:
-            found[first] = _frame(axes, start)
-            found[second] = _frame(axes, start + delta * np.linalg.norm(end - start))
+            found[lower] = _frame(axes, start)
+            found[upper] = _frame(axes, start + delta * np.linalg.norm(end - start))
         else:
-            found[first] = _frame(np.eye(3), start)
-            found[second] = _frame(axes, start)
+            found[lower] = _frame(np.eye(3), start)
+            found[upper] = _frame(axes, start)
     for k, rod in enumerate(geometry["rods"]):
         line, n = unit(rod["axis"]), normals[k]
         found[rod_body(rod)] = _frame(np.column_stack([line, n, cross(line, n)]), rod["point"])
@@ -97,10 +96,10 @@ def placements(geometry: Mapping[str, Any], pose: Array, *, zero: bool = False) 
 
 
 def _base_joint(leg: Mapping[str, Any], end: Array) -> Array:
-    """Where a leg's base joint is, with its platform joint at `end`: of a slider where rail and strut's ball meet.
+    """Where a leg's base joint is, with its platform joint at `end`.
 
-    Of the two points on the rail that are a strut's length away, the one from which the strut leans along the axis
-    (branch 1) or against it (-1). NaN where there is none.
+    Of a slider it is one of the two points on the rail that are a strut's length away: the one from which
+    the strut leans along the axis (branch 1) or against it (-1). NaN where there is none.
     """
     start, slider = np.array(leg["base"]["point"]), leg["slider"]
     if slider is None:

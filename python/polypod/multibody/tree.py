@@ -94,7 +94,7 @@ class LegParts:
     """The link that the base joint turns: the cylinder, or the strut."""
     actuated: bool
     coordinate: float
-    """The prismatic joint's coordinate where it is at zero, m: distance from B to b, or place of the carriage."""
+    """Distance from B to b, or place of the carriage on its rail, where the prismatic joint is at zero, m."""
     spins: bool
     """Whether the leg may turn freely about its own axis."""
     rail: tuple[Array, Array] | None
@@ -163,8 +163,8 @@ def describe(mech: Mechanism) -> Multibody:
 def release(tree: Multibody) -> Multibody:
     """The same bodies with the platform set free: how they move off the constraints, by convention [T62].
 
-    Each leg follows its point of the platform, a carriage on its rail, and turns by the joint that keeps it from
-    spinning, the base joint if it does; a rod follows the first leg that it carries.
+    Each leg follows its point of the platform, a carriage on its rail, and turns by the joint that keeps it
+    from spinning, the base joint if it does; a rod follows the first leg that it carries.
     """
     bodies, closures = [], []
     parents = {leg.hinge: BASE if leg.rail is None else leg.cylinder for leg in tree.legs}

@@ -24,7 +24,7 @@ from polypod.verify.rows import Row, Slide, Start
 
 Array = NDArray[np.float64]
 Drive = Callable[[float], tuple[Array, Array]]
-"""Time, s → forces of the legs (L,), N, positive apart or along the rail; load at o (6,), base axes, N and N m."""
+"""Time, s → forces of the legs (L,), N, positive apart or along the rail; load at o (6,), base axes, SI."""
 
 NEWTON = 1e-10
 """Relative and absolute tolerance of the integrator's Newton iteration."""
@@ -159,8 +159,10 @@ class System:
             return held[t]
 
         for i, leg in enumerate(self.tree.legs):
-            # In the link's axes: along the leg, apart, or along the rail, against the base, which holds still.
-            pushed = ((leg.piston, Y), (leg.cylinder, -Y)) if leg.rail is None else ((leg.slide, leg.rail[1]),)
+            # In the links' axes: along the leg, apart, or along the rail, on the carriage alone.
+            pushed = (
+                ((leg.piston, Y), (leg.cylinder, -Y)) if leg.rail is None else ((leg.slide, leg.rail[1]),)
+            )
             for body, way in pushed:
 
                 def push(mbs: Any, t: float, load: Any, i: int = i, way: Array = way) -> list[float]:
