@@ -19,8 +19,8 @@ def requirements(mech: Mechanism, solution: Solution) -> list[dict[str, Any]]:
 
     Force in N, speed in m/s and power in W have each `peak`, the value of largest size with its sign; `time`
     of the peak, s; and `rms`, over time (`rms_over_time`). The stroke has `least` and `greatest` length, or
-    place of a carriage, m, `used`, their difference, `limits` of the mechanism file, and `share`, the part of that range in use.
-    States without an answer are left out.
+    place of a carriage, m, `used`, their difference, `limits` of the mechanism file, and `share`, the part of
+    that range in use. States without an answer are left out.
     """
     data = solution.dataset
     time = data["time"].to_numpy()

@@ -196,7 +196,7 @@ class Mechanism:
 
     @property
     def sliders(self) -> NDArray[np.bool_]:
-        """(n,): which legs slide on a rail: their lengths are places q of carriages, their forces along it."""
+        """(n,): which legs slide on a rail: their lengths are places q of carriages, forces along it."""
         return np.array([leg["slider"] is not None for leg in self._spec["legs"]], dtype=bool)
 
     @property

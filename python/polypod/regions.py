@@ -65,7 +65,7 @@ def position_bounds(mech: Mechanism) -> Array:
     """(3, 2): a box that holds every reachable position of o on the side of the base where home is, m.
 
     Leg i reaches no farther from B_i than its stroke and |m_i| together, a slider no farther from its rail
-    than its strut and |m_i|. Along the axis that is closest to the normal of the plane of the base joints, the
+    than its strut and |m_i|. Along the axis that is closest to the normal of the base joints' plane, the
     box begins at their middle; not where rails stand out of a plane. Infinite without strokes.
     """
     legs = mech.geometry["legs"]

@@ -55,7 +55,7 @@ def _drawn_out(cylinder: Link, place: Array, corners: Array) -> tuple[Array, NDA
 
 
 def _bared(axis: Array, shoe: Array, corners: Array) -> tuple[Array, NDArray[np.bool_]]:
-    """A rail's faces (k, 4, 3) but for what is in the block with corners `shoe` (m, 3); and which are left."""
+    """A rail's faces (k, 4, 3) outside the block with the corners `shoe` (m, 3); and which are left."""
     low, high = (shoe @ axis).min(), (shoe @ axis).max()
     at = corners @ axis
     within = (low < at) & (at < high)

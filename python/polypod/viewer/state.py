@@ -170,7 +170,7 @@ class Model:
         return low, high
 
     def length_range(self, leg: int) -> tuple[float, float]:
-        """Least and greatest length or place that the page offers for a leg, m: a little beyond its stroke."""
+        """Least and greatest length or place that is offered for a leg, m: a little beyond its stroke."""
         low, high = self.mech.stroke[leg]
         if not np.isfinite(high):
             home, half = float(self._home_lengths[leg]), 0.5 * float(spans(self.mech)[leg])
