@@ -202,9 +202,9 @@ class _Shapes:
         towards = ends.mean(axis=0) + above - middle.mean(axis=0)
         base = (middle.mean(axis=0) - mech.home[:3, 3] - above) @ mech.home[:3, :3]
         self._down = _plate_normal(self._platform, base - self._platform.mean(axis=0))
-        self._lay_rails(ways, middle, towards, ends.mean(axis=0))
+        self._lay_rails(ways, middle, towards, ends)
 
-    def _lay_rails(self, ways: dict[int, Array], joints: Array, towards: Array, center: Array) -> None:
+    def _lay_rails(self, ways: dict[int, Array], joints: Array, towards: Array, platform: Array) -> None:
         """The base's plate, and the rails: they lie on it if all are in one plane, else they stand."""
         still = [i for i in range(len(joints)) if i not in ways]
         stands = np.concatenate([self._base[still], *ways.values()])
@@ -218,9 +218,10 @@ class _Shapes:
         self._rails = {}
         for i, ends in ways.items():
             axis = unit(ends[1] - ends[0])
-            away = joints[i] - center if plane is None else -self._up
+            away = joints[i] - platform.mean(axis=0) if plane is None else -self._up
             self._rails[i] = Rail(ends, axis, behind(axis, away), self._radii[i])
         self._standing = plane is None
+        self._lowest = float(np.min(platform @ self._up))
 
     def links(self) -> tuple[Link, ...]:
         legs = range(self._mech.n_legs)
@@ -245,8 +246,10 @@ class _Shapes:
             for k, end in enumerate(sorted(rail.bar_ends(), key=lambda end: float(end @ up)), 1)
             if k == 1 or not self._standing
         ]
-        extra = np.array([end for _, end in feet]).reshape(-1, 3)
-        pieces = self._body("base", self._base, up, BASE, extra)
+        ends = np.array([end for _, end in feet]).reshape(-1, 3)
+        # Below the platform, too, where that hangs between the rails.
+        over = np.maximum(ends @ up - self._lowest + 5.0 * thick, 0.0) if self._standing else np.zeros(len(ends))
+        pieces = self._body("base", self._base, up, BASE, ends - over[:, None] * up)
         low = float(np.min(pieces[0].mesh.vertices @ up)) + 0.1 * thick
         for name, end in feet:
             pieces.append(Piece(name, BASE, tube(end - (float(end @ up) - low) * up, end, 0.9 * thick)))
