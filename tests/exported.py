@@ -14,12 +14,14 @@ from polypod.export.shapes import body_name
 from polypod.multibody.tree import describe
 
 sys.path.insert(0, str(Path(__file__).parent))
+import sliders
 import test_oracle as cases
 
 DATA = Path(__file__).parent / "data"
 LU = "lu-3spu-2rpu-r"
 MECHANISMS = (LU, "ups-hexapod", "3-rps", "rod-lined", "rpr", "upf", "fpu", "fpf", "passive", "massless")
 """The paper's; six UPS; three RPS; legs coupled by a rod; R, F and U at either end; passive; no masses."""
+MECHANISMS += tuple(f"slider {name}" for name in sliders.LEGS)
 
 NASTY = {"1": "a/b", "2": "a b", "3": "a_b", "4": "αβ-->", "5": '<5 & "6">'}
 """Names of legs that no format takes, and that become the same."""
@@ -30,6 +32,8 @@ def mechanism(name):
     """By name; never changed."""
     if name in (LU, "ups-hexapod"):
         return pp.load(name)
+    if name.startswith("slider "):
+        return sliders.mechanism(name.removeprefix("slider "))
     if name == "massless":
         return without_masses()
     return pp.load(DATA / f"{name}.toml") if name == "3-rps" else cases.case(name).mech
@@ -82,7 +86,8 @@ def places(mech, pose):
     links = links_of(mech)
     names = [body_name(mech, link) for link in links]
     # A leg with S at both ends spins as it likes.
-    spins = [link.kind in ("cylinder", "piston") and mech.leg_letters[link.index] == "SPS" for link in links]
+    turns = ("cylinder", "piston", "strut")
+    spins = [link.kind in turns and mech.leg_letters[link.index] in ("SPS", "PSS") for link in links]
     known = frames.turn_known & ~np.array(spins)
     return dict(zip(names, frames.frames, strict=True)), dict(zip(names, known, strict=True))
 
@@ -92,6 +97,14 @@ def bodies(mech):
     spec = mech.geometry
     given = {"platform": spec["platform"]} | {f"rod {rod['name']}": rod["body"] for rod in spec["rods"]}
     for leg in spec["legs"]:
-        given |= {f"leg {leg['name']} {part}": leg[part] for part in ("cylinder", "piston")}
+        if leg["slider"] is None:
+            given |= {f"leg {leg['name']} {part}": leg[part] for part in ("cylinder", "piston")}
+            continue
+        slider, strut = leg["slider"], leg["piston"]
+        # A radius of gyration of a tenth of the strut, of no effect; the strut's frame is at its foot.
+        inertia = slider["carriage"]["mass"] * (0.1 * slider["strut"]) ** 2 * np.eye(3)
+        given[f"leg {leg['name']} carriage"] = slider["carriage"] | {"inertia": inertia}
+        center = np.add(strut["center"], [0.0, slider["strut"], 0.0])
+        given[f"leg {leg['name']} strut"] = strut | {"center": center}
     assert given.keys() == {body.name for body in describe(mech).bodies}
     return given

@@ -117,7 +117,7 @@ def test_mujoco_has_masses_and_places(name, tmp_path):
     assert model.opt.gravity == pytest.approx(mech.geometry["gravity"])
 
 
-@pytest.mark.parametrize("name", ["rpr", "3-rps"])
+@pytest.mark.parametrize("name", ["rpr", "3-rps", "slider prs"])
 def test_mujoco_has_limits_and_motors(name, tmp_path):
     tables = mechanism(name).to_dict()
     unit = {"deg": 1.0, "rad": np.pi / 180.0}[tables["units"].setdefault("angle", "deg")]
@@ -130,7 +130,7 @@ def test_mujoco_has_limits_and_motors(name, tmp_path):
     home = mech.inverse_kinematics(mech.home).lengths
     for leg, stroke, length in zip(mech.leg_names, mech.stroke, home, strict=True):
         joint = model.joint(f"leg_{leg}_slide")
-        assert bool(joint.limited[0]) == bool(stroke[0] > 0.0)
+        assert bool(joint.limited[0]) == bool(stroke[0] > 0.0 or np.isfinite(stroke).all())
         if joint.limited[0]:
             assert np.allclose(joint.range + length, stroke, rtol=0.0, atol=ROUNDING)
     turn = model.joint(f"leg_{mech.leg_names[revolute]}_base_joint_1")
@@ -434,21 +434,25 @@ def test_sdformat_finds_joints(name, sdformat, tmp_path):
         )
         rod = leg["base"]["rod"]
         below = "base" if rod is None else names[f"rod {mech.rod_names[rod]}"]
-        cylinder, piston = (names[f"leg {leg['name']} {part}"] for part in ("cylinder", "piston"))
-        assert [(j["parent"], j["child"]) for j in (base, slide, top)] == [
-            (below, cylinder),
-            (cylinder, piston),
-            (piston, "platform"),
-        ]
+        parts = ("cylinder", "piston") if leg["slider"] is None else ("carriage", "strut")
+        first, second = (names[f"leg {leg['name']} {part}"] for part in parts)
+        pairs = [(below, first), (first, second), (second, "platform")]
+        if leg["slider"] is not None:
+            pairs[:2] = [(first, second), ("base", first)]
+        assert [(j["parent"], j["child"]) for j in (base, slide, top)] == pairs
         kinds = (leg["base"]["joint"], "P", leg["platform"]["joint"])
         assert [joint["type"] for joint in (base, slide, top)] == [TYPES[kind] for kind in kinds]
-        B = np.array(leg["base"]["point"])
-        for joint, point in ((base, B), (slide, B + home.vectors[i]), (top, B + home.vectors[i])):
+        B, way = np.array(leg["base"]["point"]), home.directions[i]
+        at = B + home.vectors[i]
+        if leg["slider"] is not None:
+            way = np.array(leg["slider"]["axis"]) / np.linalg.norm(leg["slider"]["axis"])
+            B = at = B + home.lengths[i] * way
+        for joint, point in ((base, B), (slide, at), (top, B + home.vectors[i])):
             assert np.allclose(joint["pose"][:3], point, rtol=0.0, atol=1e-9)
         (along,) = slide["axes"]
-        assert np.allclose(along["xyz"], home.directions[i], rtol=0.0, atol=1e-9)
+        assert np.allclose(along["xyz"], way, rtol=0.0, atol=1e-9)
         assert (along["effort"] == 0.0) == (not leg["actuated"])
-        if mech.stroke[i, 0] > 0.0:
+        if np.isfinite(mech.stroke[i]).all():
             ends = np.array([along["lower"], along["upper"]]) + home.lengths[i]
             assert np.allclose(ends, mech.stroke[i], rtol=0.0, atol=ROUNDING)
         for joint, given, turn, which in (

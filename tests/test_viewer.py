@@ -104,9 +104,9 @@ def test_what_is_impossible_is_refused_in_words_and_changes_nothing(model, mech)
     for change, said in (
         (lambda: model.set_coordinate("y", y + 2.0), "No pose with y = "),
         (lambda: model.set_coordinate("y", float("nan")), "no number"),
-        (lambda: model.set_length(0, 3.0), "Leg 1 cannot be 3000.0 mm long"),
-        (lambda: model.set_length(0, float("nan")), "Leg 1 cannot be nan m long"),
-        (lambda: model.set_length(0, -1.0), "Leg 1 cannot be -1.0 m long"),
+        (lambda: model.set_length(0, 3.0), "The length of leg 1 cannot be 3000.0 mm"),
+        (lambda: model.set_length(0, float("nan")), "The length of leg 1 cannot be nan m"),
+        (lambda: model.set_length(0, -1.0), "The length of leg 1 cannot be -1.0 m"),
         (lambda: model.go(np.full((4, 4), np.nan)), "cannot stand there"),
         (lambda: model.set_time(1.0), "no motion"),
     ):

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from polypod.mechanism import Mechanism
 from polypod.results import Solution
-from polypod.summary import _greatest, _least, _numbers
+from polypod.summary import _greatest, _least, stroke_limits
 
 Array = NDArray[np.float64]
 
@@ -18,9 +18,9 @@ def requirements(mech: Mechanism, solution: Solution) -> list[dict[str, Any]]:
     """For each actuated leg: `leg`, its name; `force`, `speed` and `power`; `stroke`.
 
     Force in N, speed in m/s and power in W have each `peak`, the value of largest size with its sign; `time`
-    of the peak, s; and `rms`, over time (`rms_over_time`). The stroke has `least` and `greatest` length, m,
-    `used`, their difference, `limits` of the mechanism file, and `share`, the part of that range in use.
-    States without an answer are left out.
+    of the peak, s; and `rms`, over time (`rms_over_time`). The stroke has `least` and `greatest` length, or
+    place of a carriage, m, `used`, their difference, `limits` of the mechanism file, and `share`, the part of
+    that range in use. States without an answer are left out.
     """
     data = solution.dataset
     time = data["time"].to_numpy()
@@ -34,7 +34,7 @@ def requirements(mech: Mechanism, solution: Solution) -> list[dict[str, Any]]:
     for i in np.flatnonzero(mech.actuated).tolist():
         peaks = {name: _peak_and_rms(time, values[:, i]) for name, values in series.items()}
         found.append(
-            {"leg": mech.leg_names[i], **peaks, "stroke": _stroke_used(lengths[:, i], mech.stroke[i])}
+            {"leg": mech.leg_names[i], **peaks, "stroke": _stroke_used(lengths[:, i], stroke_limits(mech, i))}
         )
     return found
 
@@ -68,10 +68,10 @@ def _peak_and_rms(time: Array, values: Array) -> dict[str, float | None]:
     return {"peak": float(values[at]), "time": float(time[at]), "rms": rms_over_time(time, values)}
 
 
-def _stroke_used(lengths: Array, limits: Array) -> dict[str, Any]:
+def _stroke_used(lengths: Array, limits: list[float | None]) -> dict[str, Any]:
     least, greatest = _least(lengths), _greatest(lengths)
     used = None if least is None or greatest is None else greatest - least
-    low, high = _numbers(limits)
+    low, high = limits
     span = None if low is None or high is None else high - low
     return {
         "least": least,

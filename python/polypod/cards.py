@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from polypod.drives import word
 from polypod.notebook import Rows, card, counted, number, numbers, outcomes, rows_of
 from polypod.status import Status
 from polypod.units import coordinate_unit, readable
@@ -32,7 +33,7 @@ def of_mechanism(mech: Mechanism) -> str:
         (name, letters, "yes" if actuated else "no", readable(length, "m"), _stroke(*stroke))
         for name, letters, actuated, length, stroke in legs
     ]
-    headers = ("leg", "joints", "actuated", "length at home", "stroke")
+    headers = ("leg", "joints", "actuated", f"{word(mech.leg_letters)} at home", "stroke")
     sets = [(name, ", ".join(names)) for name, names in mech.coordinate_sets.items()]
     said = f"{'+'.join(mech.leg_letters)}, {mech.dof} freedoms"
     notes = [file.get("description", ""), file.get("source", ""), *(f"⚠ {text}" for text in mech.warnings)]
@@ -47,7 +48,7 @@ def of_mechanism(mech: Mechanism) -> str:
 
 def _stroke(least: float, greatest: float) -> str:
     low, high = (readable(end, "m") for end in (least, greatest))
-    if least > 0.0:
+    if np.isfinite(least) and least != 0.0:
         return f"{low} to {high}" if np.isfinite(greatest) else f"from {low}"
     return f"to {high}" if np.isfinite(greatest) else "free"
 

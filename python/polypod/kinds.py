@@ -25,6 +25,8 @@ class SingularityKind(IntEnum):
     """With all actuators locked the platform can still move: a direct singularity."""
     DEPENDENT_ROWS = 6
     """Only the constraints that J holds depend on one another: J is singular, the mechanism is not."""
+    STRUT_ACROSS_RAIL = 7
+    """The strut of a slider is square to its rail, where two branches meet: an inverse singularity."""
 
     @property
     def message(self) -> str:

@@ -199,8 +199,18 @@ class Mechanism:
 
     @property
     def stroke(self) -> Array:
-        """(n, 2): least and greatest length of each leg, m; 0 and inf where the file gives none."""
-        return np.array([leg["stroke"] or [0.0, np.inf] for leg in self._spec["legs"]])
+        """(n, 2): least and greatest length of each leg, m; 0 and inf where the file gives none.
+
+        Of a slider the ends of its carriage's way on the rail; without a stroke -inf and inf.
+        """
+        free = np.where(self.sliders, -np.inf, 0.0)
+        legs = self._spec["legs"]
+        return np.array([leg["stroke"] or [least, np.inf] for leg, least in zip(legs, free, strict=True)])
+
+    @property
+    def sliders(self) -> NDArray[np.bool_]:
+        """(n,): which legs slide on a rail: their lengths are places q of carriages, forces along it."""
+        return np.array([leg["slider"] is not None for leg in self._spec["legs"]], dtype=bool)
 
     @property
     def home(self) -> Array:
@@ -605,7 +615,9 @@ class Mechanism:
         """
         set, named = self._varied_coordinates(set, coordinates)
         if reach is None:
-            reach = float(self.inverse_kinematics(self.home).lengths.max())
+            from polypod.drives import spans
+
+            reach = float(spans(self).max())
         (poses,) = POSE(pose)
         names, out = self._core.nearest_singular(
             poses, set, named, self._length(length), _positive("reach", reach)

@@ -165,6 +165,7 @@ def _near(mech: Mechanism, known: _Known, threshold: float) -> Iterator[dict[str
     for i, leg in enumerate(mech.leg_names):
         measures.append((SingularityKind.LEG_LENGTH, leg, poses.leg_length[:, i]))
         measures.append((SingularityKind.LEG_FRAME, leg, poses.leg_sine[:, i]))
+        measures.append((SingularityKind.STRUT_ACROSS_RAIL, leg, np.abs(poses.transmission[:, i])))
     found = []
     for measured, of_leg, measure in measures:
         for start, end in _runs(measure < threshold):

@@ -20,6 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from polypod.answers import Mobility
 from polypod.canvas import Canvas, cells, pyplot_figure, size_of
+from polypod.drives import word_of
 from polypod.errors import PolypodError, ShapeError
 from polypod.mechanism import Mechanism
 from polypod.results import Solution
@@ -220,7 +221,7 @@ def fig4_panels(data: xr.Dataset) -> list[Panel]:
         six("twist", 1, r"angular velocity $\omega$", r"\omega", "rad s$^{-1}$"),
         six("acceleration", 1, r"angular acceleration $\varepsilon$", r"\varepsilon", "rad s$^{-2}$"),
         _orientation(data),
-        of_legs("length", "leg length $r$", "r_{#}", "mm", 1e3),
+        of_legs("length", *_symbols(data), "mm", 1e3),
         of_legs("rate", "leg rate $v_r$", "v_{r#}", "mm s$^{-1}$", 1e3),
         of_legs("leg_acceleration", "leg acceleration $a_r$", "a_{r#}", "mm s$^{-2}$", 1e3),
         in_kilo(forces),
@@ -228,6 +229,12 @@ def fig4_panels(data: xr.Dataset) -> list[Panel]:
         _torque(data),
     ]
     return [panel for panel in panels if panel is not None]
+
+
+def _symbols(data: xr.Dataset) -> tuple[str, str]:
+    """Label and symbol of what the prismatic joints have."""
+    word = word_of(data)
+    return ("leg length $r$", "r_{#}") if word == "length" else (f"{word} $q$", "q_{#}")
 
 
 def _orientation(data: xr.Dataset) -> Panel | None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -29,6 +29,8 @@ _CANDIDATES = 7
 _TURN = 0.3
 """Turn from home, rad, of the other rotations with which it is looked for."""
 
+_FLAT = 0.05
+"""Rails whose ends leave a plane by less than this part of their width lie in it."""
 _POSITIONS = ("x", "y", "z", "tip_x", "tip_y", "tip_z")
 
 
@@ -62,19 +64,42 @@ class Grid(NamedTuple):
 def position_bounds(mech: Mechanism) -> Array:
     """(3, 2): a box that holds every reachable position of o on the side of the base where home is, m.
 
-    Leg i reaches no farther from B_i than its stroke and |m_i| together. Along the axis that is closest to
-    the normal of the plane of the base joints, the box begins at their middle. Infinite without strokes.
+    Leg i reaches no farther from B_i than its stroke and |m_i| together, a slider no farther from its rail
+    than its strut and |m_i|. Along the axis that is closest to the normal of the base joints' plane, the
+    box begins at their middle; not where rails stand out of a plane. Infinite without strokes.
     """
     legs = mech.geometry["legs"]
-    base = np.array([leg["base"]["point"] for leg in legs])
-    reach = mech.stroke[:, 1] + np.linalg.norm([leg["platform"]["point"] for leg in legs], axis=1)
-    box = np.stack([(base - reach[:, None]).max(axis=0), (base + reach[:, None]).min(axis=0)], axis=1)
+    reach = np.linalg.norm([leg["platform"]["point"] for leg in legs], axis=1)
+    struts = [leg["slider"]["strut"] if leg["slider"] else np.nan for leg in legs]
+    reach += np.where(mech.sliders, struts, mech.stroke[:, 1])
+    # The base joint can be at any point between two.
+    ends = np.array([_ways(leg, stroke) for leg, stroke in zip(legs, mech.stroke, strict=True)])
+    low, high = ends.min(axis=1) - reach[:, None], ends.max(axis=1) + reach[:, None]
+    box = np.stack([low.max(axis=0), high.min(axis=0)], axis=1)
+    base = ends.reshape(-1, 3) if mech.sliders.any() else ends[:, 0]
+    if not np.isfinite(base).all():
+        return box
     middle = base.mean(axis=0)
-    normal = np.linalg.svd(base - middle)[2][2]
+    _, sizes, axes = np.linalg.svd(base - middle)
+    if mech.sliders.any() and sizes[2] > _FLAT * sizes[1]:
+        return box
+    normal = axes[2]
     axis = int(np.argmax(np.abs(normal)))
     home = mech.home[axis, 3]
     box[axis, 0 if home >= middle[axis] else 1] = middle[axis]
     return box
+
+
+def _ways(leg: Mapping[str, Any], stroke: Array) -> Array:
+    """(2, 3): between which points the base joint of a leg can be, m."""
+    point = np.array(leg["base"]["point"])
+    if leg["slider"] is None:
+        return np.stack([point, point])
+    axis = np.array(leg["slider"]["axis"]) / np.linalg.norm(leg["slider"]["axis"])
+    if not np.isfinite(stroke).all():
+        # Anywhere along the axes that the rail is not square to.
+        return np.array([np.where(axis == 0.0, point, -np.inf), np.where(axis == 0.0, point, np.inf)])
+    return np.asarray(point + np.outer(stroke, axis))
 
 
 def bounds_of(

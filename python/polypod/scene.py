@@ -19,6 +19,7 @@ from trimesh import Trimesh
 from polypod.bodies import JOINT, Link, leg_radii, link_frames, links_of
 from polypod.canvas import size_of
 from polypod.mechanism import Mechanism
+from polypod.rails import unit
 from polypod.solids import four_sided, tube
 from polypod.style import INK
 
@@ -51,6 +52,16 @@ def _drawn_out(cylinder: Link, place: Array, corners: Array) -> tuple[Array, NDA
     at[..., 1] = np.where(within, high, at[..., 1])
     back = np.asarray(np.linalg.inv(place), np.float64)
     return _moved(at, back), left
+
+
+def _bared(axis: Array, shoe: Array, corners: Array) -> tuple[Array, NDArray[np.bool_]]:
+    """A rail's faces (k, 4, 3) outside the block with the corners `shoe` (m, 3); and which are left."""
+    low, high = (shoe @ axis).min(), (shoe @ axis).max()
+    at = corners @ axis
+    within = (low < at) & (at < high)
+    ends = np.where((at <= low).any(axis=1), low, high)[:, None]
+    moved = corners + np.where(within, ends - at, 0.0)[..., None] * axis
+    return moved, ~within.all(axis=1)
 
 
 class _JointLabel(NamedTuple):
@@ -122,12 +133,20 @@ class Scene:
         self.joint_labels: list[_JointLabel] = []
         sides = [leg[side]["joint"] for leg in spec["legs"] for side in ("base", "platform")]
         self.kinds = dict.fromkeys(sides)  # joint kinds in use, in order
+        self._rail_axes = {
+            f"rail {leg['name']}": unit(leg["slider"]["axis"])
+            for leg in spec["legs"]
+            if leg["slider"] is not None
+        }
         self._size, thick = mech.characteristic_length, max(leg_radii(mech))
         self._add_links(links_of(mech), link_frames(mech, pose).frames)
-        base = np.array([leg["base"]["point"] for leg in spec["legs"]])
-        platform = base + mech.inverse_kinematics(pose).vectors
+        vectors = mech.inverse_kinematics(pose).vectors
+        platform = np.array([leg["platform"]["point"] for leg in spec["legs"]]) @ pose[:3, :3].T + pose[:3, 3]
+        # A slider's base joint is on its carriage.
+        base = platform - vectors
         for i, name in enumerate(mech.leg_names):
-            for letter, points, leg_side in (("B", base, 1), ("b", platform, -1)):
+            below = "B" if spec["legs"][i]["slider"] is None else "Q"
+            for letter, points, leg_side in ((below, base, 1), ("b", platform, -1)):
                 text = f"${letter}_{{{math_name(name)}}}$"
                 away = points[i] - points.mean(axis=0)
                 self.joint_labels.append(_JointLabel(points[i], away, leg_side, 5.2 * thick, text))
@@ -148,7 +167,14 @@ class Scene:
         return [*self.labels, *((label.place(right, up), label.text) for label in self.joint_labels)]
 
     def _add_links(self, links: tuple[Link, ...], frames: Array) -> None:
-        """All links; but nothing inside a barrel, which faces sorted by their depth would not hide."""
+        """All links; but nothing inside a barrel or a carriage: faces sorted by depth would not hide it."""
+        shoes = {
+            f"rail {link.name.removeprefix('carriage ')}": _moved(
+                np.array(link.pieces[0].mesh.vertices), place
+            )
+            for link, place in zip(links, frames, strict=True)
+            if link.kind == "carriage" and np.isfinite(place).all()
+        }
         for k, (link, place) in enumerate(zip(links, frames, strict=True)):
             if not np.isfinite(place).all():
                 continue  # a leg without length, which has no direction
@@ -159,7 +185,10 @@ class Scene:
                 within = np.eye(4) if cylinder == k else np.linalg.inv(frames[cylinder]) @ place
                 drawn_out = partial(_drawn_out, links[cylinder], within)
             for piece in link.pieces:
-                self.faces.add(piece.mesh, piece.color, place, drawn_out)
+                bared = None
+                if link.kind == "base" and piece.name in shoes:
+                    bared = partial(_bared, self._rail_axes[piece.name], shoes[piece.name])
+                self.faces.add(piece.mesh, piece.color, place, bared or drawn_out)
 
     def _rod_label(self, rod: dict[str, Any], points: Array, thick: float) -> None:
         axis, start = np.array(rod["axis"]), np.array(rod["point"])

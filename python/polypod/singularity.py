@@ -27,9 +27,9 @@ NEAR_SINGULAR = 0.01
 class Singularity(Answer):
     """How near poses are to singularities, and to which kind [T24, T30-T33]; base axes.
 
-    Where a leg has no direction (LEG_LENGTH) the status is SINGULAR, and only the kind, its leg, and the
-    measures of legs and constraints stand. Elsewhere singular poses have the status OK: the question has its
-    answer.
+    Where a leg has no direction (LEG_LENGTH), or a slider's strut is square to its rail (STRUT_ACROSS_RAIL),
+    the status is SINGULAR, and only the kind, its leg, and the measures of legs and constraints stand.
+    Elsewhere singular poses have the status OK: the question has its answer.
     """
 
     determinant: Array
@@ -46,6 +46,11 @@ class Singularity(Answer):
     """(..., n): lengths of the legs by the characteristic length, 1."""
     leg_sine: Array
     """(..., n): sine of the angle between leg and axis of its universal joint or rod; about 1 for others."""
+    transmission: Array
+    """(..., n): cosine of the angle between strut and prismatic joint; 1 for a telescopic leg [T68].
+
+    Positive where a slider's strut leans along its rail's axis, negative where against it.
+    """
     kind: Kinds
     """(...): `SingularityKind`."""
     leg: Kinds
@@ -75,6 +80,7 @@ class Singularity(Answer):
         "constraint_sigma": "constraint_sigma",
         "leg_length": "relative_length",
         "leg_sine": "leg_sine",
+        "transmission": "transmission",
         "kind": "singularity_kind",
         "leg": "singular_leg",
         "uncontrolled": "uncontrolled",

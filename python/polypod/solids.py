@@ -116,6 +116,23 @@ def block(center: ArrayLike, axis: ArrayLike, size: float) -> Trimesh:
     return tube(center - half, center + half, size / np.sqrt(2), sides=4)
 
 
+def beam(start: ArrayLike, end: ArrayLike, width: float, side: ArrayLike) -> Trimesh:
+    """A square bar, a face of which looks along the unit vector `side`, square to the bar."""
+    start, side = np.asarray(start, float), np.asarray(side, float)
+    along = np.asarray(end, float) - start
+    length = float(np.linalg.norm(along))
+    other = np.cross(along / length, side)
+    mesh = tube((0.0, 0.0, 0.0), (0.0, 0.0, length), width / np.sqrt(2), sides=4)
+    place = np.eye(4)
+    # Its edges are at the first and second axis.
+    place[:3, :3] = np.column_stack(
+        [(side - other) / np.sqrt(2), (side + other) / np.sqrt(2), along / length]
+    )
+    place[:3, 3] = start
+    mesh.apply_transform(place)
+    return mesh
+
+
 def plate(points: Array, normal: Array, thickness: float, margin: float) -> Trimesh:
     """A flat plate with round corners under (k, 3) points; the unit `normal` points from it to them."""
     x, y = across(normal)

@@ -26,7 +26,9 @@ class Status(IntEnum):
     OUT_OF_CONE = 9
     MODE_JUMP = 10
     OUT_OF_ANGLE = 11
-    INCONSISTENT = 12
+    OUT_OF_REACH = 12
+    OTHER_BRANCH = 13
+    INCONSISTENT = 14
 
     @property
     def has_answer(self) -> bool:
@@ -37,6 +39,7 @@ class Status(IntEnum):
             Status.OUT_OF_CONE,
             Status.OUT_OF_ANGLE,
             Status.MODE_JUMP,
+            Status.OTHER_BRANCH,
         )
 
     @property

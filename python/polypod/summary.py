@@ -80,7 +80,7 @@ def describe(mech: Mechanism) -> dict[str, Any]:
     mobility, file = mech.mobility(), mech.to_dict()
     centre = mech.conditioning(mech.home)
     home = mech.inverse_kinematics(mech.home).lengths
-    legs = zip(mech.leg_names, mech.leg_letters, mech.actuated, home, mech.stroke, strict=True)
+    legs = zip(mech.leg_names, mech.leg_letters, mech.actuated, home, strict=True)
     return {
         "name": mech.name,
         "description": file.get("description", ""),
@@ -92,9 +92,9 @@ def describe(mech: Mechanism) -> dict[str, Any]:
                 "joints": letters,
                 "actuated": bool(actuated),
                 "home_length": float(length),
-                "stroke": _numbers(stroke),
+                "stroke": stroke_limits(mech, i),
             }
-            for name, letters, actuated, length, stroke in legs
+            for i, (name, letters, actuated, length) in enumerate(legs)
         ],
         "mobility": {term: getattr(mobility, term) for term in _MOBILITY}
         | {"idle": [asdict(idle) for idle in mobility.idle], "rows": mech.n_rows},
@@ -185,8 +185,9 @@ def summarise(mech: Mechanism, solution: Solution) -> dict[str, Any]:
     legs = [
         {
             "name": name,
+            "joints": mech.leg_letters[i],
             "length": [_least(of("length")[:, i]), _greatest(of("length")[:, i])],
-            "stroke": _numbers(mech.stroke[i]),
+            "stroke": stroke_limits(mech, i),
             "outside_stroke": _outside(of("length")[:, i], mech.stroke[i]),
             "peak_rate": _peak(of("rate")[:, i]),
             "peak_force": _peak(of("force")[:, i]),
@@ -307,9 +308,10 @@ def _number(value: ArrayLike) -> float | None:
     return number if math.isfinite(number) else None
 
 
-def _numbers(values: ArrayLike) -> list[float | None]:
-    """Limits; a least length of zero is none."""
-    return [_number(v) if v != 0.0 else None for v in np.asarray(values)]
+def stroke_limits(mech: Mechanism, leg: int) -> list[float | None]:
+    """Least and greatest length or place of a leg, m; None for no limit, also for a least length of zero."""
+    low, high = mech.stroke[leg]
+    return [_number(low) if low != 0.0 or mech.sliders[leg] else None, _number(high)]
 
 
 def _reciprocal(value: float | None) -> float | None:

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from polypod.drives import word
 from polypod.units import coordinate_unit, readable
 
 Facts = dict[str, Any]
@@ -61,7 +62,8 @@ def legs_table(facts: Facts) -> Table:
         )
         for leg in facts["legs"]
     ]
-    return Table("Legs", ("leg", "joints", "actuated", "length at home / mm>", "stroke / mm>"), rows)
+    at_home = f"{word(leg['joints'] for leg in facts['legs'])} at home / mm>"
+    return Table("Legs", ("leg", "joints", "actuated", at_home, "stroke / mm>"), rows)
 
 
 def mobility_table(facts: Facts) -> Table:
@@ -265,7 +267,7 @@ def motion_tables(facts: Facts) -> list[Table]:
 
 
 def motion_table(facts: Facts) -> Table:
-    """Lengths, speeds and forces of the legs along a motion."""
+    """Lengths or places, speeds and forces of the legs along a motion."""
     rows = [
         (
             leg["name"],
@@ -276,9 +278,8 @@ def motion_table(facts: Facts) -> Table:
         )
         for leg in facts["legs"]
     ]
-    return Table(
-        "Legs", ("leg", "length / mm>", "stroke / mm>", "peak speed / mm/s>", "peak force / N>"), rows
-    )
+    passed = f"{word(leg['joints'] for leg in facts['legs'])} / mm>"
+    return Table("Legs", ("leg", passed, "stroke / mm>", "peak speed / mm/s>", "peak force / N>"), rows)
 
 
 def peaks_table(facts: Facts) -> Table:

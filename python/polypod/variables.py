@@ -149,6 +149,7 @@ FURTHER = _variables(
         "constraint_sigma": (_ONE, "1", "", "smallest singular value of the constraints' rows"),
         "relative_length": (_LEG, "1", "", "leg length by the characteristic length"),
         "leg_sine": (_LEG, "1", "", "sine of the angle between leg and axis of its joint or rod"),
+        "transmission": (_LEG, "1", "", "cosine between strut and prismatic joint; 1 for a telescopic leg"),
         "singularity_kind": (_ONE, "", "", "kind of the singularity", SingularityKind),
         "singular_leg": (_ONE, "1", "", "index of the leg that the kind speaks of; -1 for none"),
         "uncontrolled": (_ONE, "1", "", "freedoms that locked actuators leave; -1 where not known"),

@@ -110,20 +110,20 @@ def _bytes(scene: Any, **options: Any) -> bytes:
 
 
 def _parents(mech: Mechanism, links: tuple[Link, ...]) -> list[int | None]:
-    """The link that each hangs on: rods on the base, legs on base or rod, pistons on cylinders."""
+    """The link that each hangs on: of a leg the second on the first, that on its rod or on the base."""
     index = {(link.kind, link.index): i for i, link in enumerate(links)}
     found: list[int | None] = []
     for link in links:
         match link.kind:
             case "base" | "platform":
                 found.append(None)
-            case "rod":
+            case "rod" | "carriage":
                 found.append(index["base", 0])
             case "cylinder":
                 rod = mech.geometry["legs"][link.index]["base"]["rod"]
                 found.append(index["base", 0] if rod is None else index["rod", rod])
-            case "piston":
-                found.append(index["cylinder", link.index])
+            case "piston" | "strut":
+                found.append(index["cylinder" if link.kind == "piston" else "carriage", link.index])
     return found
 
 

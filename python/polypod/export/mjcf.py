@@ -1,4 +1,4 @@
-"""A mechanism as a model file for MuJoCo (MJCF): loops closed by equalities, motors along the legs."""
+"""A mechanism as a model file for MuJoCo (MJCF): loops closed by equalities, motors along legs and rails."""
 
 from __future__ import annotations
 
@@ -107,13 +107,13 @@ def _brief(values: Any) -> str:
 
 
 def _add_motors(made: Skeleton, model: Model) -> None:
-    """A motor along each actuated leg: its control is the active force, N, positive when it pushes."""
+    """A motor along each actuated leg or its rail: its control is the active force, N."""
     motors = ElementTree.SubElement(made.root, "actuator")
     bodies = {body.name: body for body in model.tree.bodies}
     for i, leg in enumerate(model.tree.legs):
         if not leg.actuated:
             continue
-        joint = model.names("joint", joint_name(bodies[leg.piston], 0))
+        joint = model.names("joint", joint_name(bodies[leg.slide], 0))
         attributes = {"name": model.names("motor", f"leg {leg.name}"), "joint": joint}
         allowed = model.force_of(i)
         if allowed is not None:

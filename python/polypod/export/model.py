@@ -71,7 +71,7 @@ class Model:
         return [body.name for body in self.tree.bodies if body.mass == 0.0]
 
     def leg_of(self, body: Body) -> tuple[LegParts, dict[str, Any]] | None:
-        """The leg that a cylinder or piston belongs to, and what the mechanism says of it."""
+        """The leg that a link belongs to, and what the mechanism says of it."""
         legs = self.mech.geometry["legs"]
         for parts, leg in zip(self.tree.legs, legs, strict=True):
             if body.name in (parts.cylinder, parts.piston):
@@ -86,9 +86,9 @@ class Model:
         if found is None:
             return None
         parts, leg = found
-        if body.name == parts.piston:
+        if body.name == parts.slide:
             stroke = _range(leg["stroke"])
-            return stroke and Range(stroke.least - parts.length, stroke.greatest - parts.length)
+            return stroke and Range(stroke.least - parts.coordinate, stroke.greatest - parts.coordinate)
         return _range(leg["base"]["range"]) if leg["base"]["joint"] == "R" and i == 0 else None
 
     def closing_range(self, index: int) -> Range | None:
@@ -105,6 +105,10 @@ class Model:
             f"{self.mech.name}: {format}, written by Polypod {_core.__version__}.",
             "Units: m, kg, s, rad. A leg's links have the axes (n, delta, n x delta) at B and at b.",
         ]
+        if any(leg.rail is not None for leg in self.tree.legs):
+            facts.append(
+                "Carriages have the base's axes, struts (n, delta, n x delta), both at the base joint."
+            )
         renamed = [f"{given} is {name}" for given, name in self.names.changed("link").items()]
         if renamed:
             facts.append(f"Names: {'; '.join(renamed)}.")
@@ -118,10 +122,10 @@ def _labels(tree: Multibody, closing: Sequence[ClosingJoint]) -> dict[tuple[str,
     labels |= {("joint", joint_name(bodies[rod], 0)): f"{rod} turn" for rod in tree.rods}
     labels["joint", joint_name(bodies[PLATFORM], 0)] = "platform free"
     for leg, joint in zip(tree.legs, closing, strict=True):
-        cylinder, piston = bodies[leg.cylinder], bodies[leg.piston]
-        for i in range(len(cylinder.freedoms)):
-            labels["joint", joint_name(cylinder, i)] = f"leg {leg.name} base joint {i + 1}"
-        labels["joint", joint_name(piston, 0)] = f"leg {leg.name} slide"
+        hinge, slide = bodies[leg.hinge], bodies[leg.slide]
+        for i in range(len(hinge.freedoms)):
+            labels["joint", joint_name(hinge, i)] = f"leg {leg.name} base joint {i + 1}"
+        labels["joint", joint_name(slide, 0)] = f"leg {leg.name} slide"
         labels["link", cross_name(joint)] = f"leg {leg.name} cross"
         labels["joint", f"{cross_name(joint)} 0"] = f"leg {leg.name} platform joint 1"
     return labels

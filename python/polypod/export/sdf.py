@@ -66,12 +66,12 @@ def _add_tree_joint(node: ElementTree.Element, model: Model, body: Body) -> None
     efforts: list[float | None] = [None] * len(body.freedoms)
     name = f"{body.name} joint"
     for i, leg in enumerate(model.tree.legs):
-        if body.name == leg.piston:
+        if body.name == leg.slide:
             # No effort is no limit; a passive leg has none to give.
             limited = model.force_of(i) is not None
             greatest = effort(model, i) if limited else None
             name, efforts = f"leg {leg.name} slide", [greatest if leg.actuated else 0.0]
-        elif body.name == leg.cylinder:
+        elif body.name == leg.hinge:
             name = f"leg {leg.name} base joint"
     _add_joint(
         node, model, model.names("joint", name), (body.parent, body.name), body.freedoms, ranges, efforts

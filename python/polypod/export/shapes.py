@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 import trimesh
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from polypod.bodies import Link, leg_radii, links_of
 from polypod.mechanism import Mechanism
 from polypod.multibody.placement import across, leg_bodies, rod_body
+from polypod.rails import unit, way
 from polypod.style import PALE, color_of
 
 Array = NDArray[np.float64]
@@ -49,8 +50,8 @@ def body_name(mech: Mechanism, link: Link) -> str:
     match link.kind:
         case "rod":
             return rod_body(spec["rods"][link.index])
-        case "cylinder" | "piston":
-            return leg_bodies(spec["legs"][link.index])[link.kind == "piston"]
+        case "cylinder" | "piston" | "carriage" | "strut":
+            return leg_bodies(spec["legs"][link.index])[link.kind in ("piston", "strut")]
     return link.kind
 
 
@@ -87,12 +88,14 @@ def simple(mech: Mechanism) -> dict[str, list[Shape]]:
         ends = np.array([[min(along) - radius, 0.0, 0.0], [max(along) + radius, 0.0, 0.0]])
         shapes[rod_body(rod)] = [_bar(f"{rod_body(rod)} bar", ends, 0.6 * radius, PLAIN)]
     for i, leg in enumerate(spec["legs"]):
-        cylinder, piston = leg_bodies(leg)
-        color, part = color_of(i) if leg["actuated"] else PALE, PART * float(lengths[i])
-        for body, end, radius in ((cylinder, part, radii[i]), (piston, -part, 0.55 * radii[i])):
-            ends = np.array([[0.0, 0.0, 0.0], [0.0, end, 0.0]])
-            shapes[body] = [_bar(f"{body} bar", ends, radius, color)]
-        shapes["base"].append(_ball(f"base ball {leg['name']}", leg["base"]["point"], 1.2 * radii[i]))
+        color = color_of(i) if leg["actuated"] else PALE
+        if leg["slider"] is None:
+            shapes |= _telescope(leg, PART * float(lengths[i]), radii[i], color)
+            shapes["base"].append(_ball(f"base ball {leg['name']}", leg["base"]["point"], 1.2 * radii[i]))
+        else:
+            shapes |= _slider(leg, radii[i], color)
+            rail = way(leg, float(lengths[i]))
+            shapes["base"].append(_bar(f"base rail {leg['name']}", rail, 0.6 * radii[i], PLAIN))
         shapes["platform"].append(
             _ball(f"platform ball {leg['name']}", leg["platform"]["point"], 1.2 * radii[i])
         )
@@ -100,6 +103,26 @@ def simple(mech: Mechanism) -> dict[str, list[Shape]]:
         if np.linalg.norm(spoke[1]) > radii[i]:
             shapes["platform"].append(_bar(f"platform spoke {leg['name']}", spoke, 0.5 * radii[i], PLAIN))
     return shapes
+
+
+def _telescope(leg: dict[str, Any], part: float, radius: float, color: str) -> dict[str, list[Shape]]:
+    """Of cylinder and piston, each `part` long."""
+    shapes = {}
+    for body, end, r in zip(leg_bodies(leg), (part, -part), (radius, 0.55 * radius), strict=True):
+        ends = np.array([[0.0, 0.0, 0.0], [0.0, end, 0.0]])
+        shapes[body] = [_bar(f"{body} bar", ends, r, color)]
+    return shapes
+
+
+def _slider(leg: dict[str, Any], radius: float, color: str) -> dict[str, list[Shape]]:
+    """Of carriage and strut."""
+    carriage, strut = leg_bodies(leg)
+    half = radius * unit(leg["slider"]["axis"])
+    ends = np.array([[0.0, 0.0, 0.0], [0.0, leg["slider"]["strut"], 0.0]])
+    return {
+        carriage: [_bar(f"{carriage} bar", np.array([-half, half]), 1.4 * radius, color)],
+        strut: [_bar(f"{strut} bar", ends, 0.6 * radius, color)],
+    }
 
 
 def _ball(name: str, center: list[float], radius: float) -> Shape:

@@ -89,8 +89,8 @@ class _Writer:
             f"# {line}\n" for line in model.about("loop closures of the URDF", notes).splitlines()
         )
         bodies = {body.name: body for body in model.tree.bodies}
-        actuated = [bodies[leg.piston] for leg in model.tree.legs if leg.actuated]
-        motors = [model.names("joint", joint_name(piston, 0)) for piston in actuated]
+        actuated = [bodies[leg.slide] for leg in model.tree.legs if leg.actuated]
+        motors = [model.names("joint", joint_name(body, 0)) for body in actuated]
         values = {
             "closed_loop": [list(pair) for pair in self._loops],
             "type": self._types,
@@ -108,7 +108,7 @@ class _Writer:
         ranges = [model.range_of(body, i) for i in range(len(body.freedoms))]
         greatest = NO_LIMIT
         for i, leg in enumerate(model.tree.legs):
-            if body.name == leg.piston:
+            if body.name == leg.slide:
                 greatest = effort(model, i) if leg.actuated else 0.0
         self._chain(body.parent, body.name, place, body.freedoms, ranges, body, greatest)
 

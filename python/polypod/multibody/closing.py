@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class ClosingJoint:
-    """The joint between a piston and the platform that closes the loop of a leg."""
+    """The joint between a piston or strut and the platform that closes the loop of a leg."""
 
     name: str
     kind: Literal["S", "U", "R", "F"]

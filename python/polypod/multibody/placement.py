@@ -1,6 +1,7 @@
 """Where the links of a mechanism are at a pose of the platform, from points and axes alone.
 
-A leg's frame is (n, δ, n×δ), as the mechanism file's format defines it; a rod's is (L, n, L×n).
+A leg's frame is (n, δ, n×δ), as the mechanism file's format defines it; a rod's is (L, n, L×n). A carriage,
+which does not turn, has the base's. The origin is at the base joint, of a piston at the platform joint.
 """
 
 from __future__ import annotations
@@ -35,8 +36,9 @@ class Turning:
 
 
 def leg_bodies(leg: Mapping[str, Any]) -> tuple[str, str]:
-    """Names of a leg's cylinder and piston."""
-    return f"leg {leg['name']} cylinder", f"leg {leg['name']} piston"
+    """Names of a leg's two links, from the base on: cylinder and piston, or carriage and strut."""
+    first, second = ("cylinder", "piston") if leg["slider"] is None else ("carriage", "strut")
+    return f"leg {leg['name']} {first}", f"leg {leg['name']} {second}"
 
 
 def rod_body(rod: Mapping[str, Any]) -> str:
@@ -69,8 +71,8 @@ def placements(geometry: Mapping[str, Any], pose: Array, *, zero: bool = False) 
     found: Placements = {PLATFORM: np.array(pose)}
     normals: dict[int, Array] = {}
     for leg in geometry["legs"]:
-        start = np.array(leg["base"]["point"])
         end = pose[:3, :3] @ leg["platform"]["point"] + pose[:3, 3]
+        start = _base_joint(leg, end)
         delta = unit(end - start)
         n = _normal(turning_of(geometry, leg), pose, delta)
         rod = leg["base"]["rod"]
@@ -80,13 +82,33 @@ def placements(geometry: Mapping[str, Any], pose: Array, *, zero: bool = False) 
                 n = first
         delta = unit(delta - n * (n @ delta))
         axes = np.column_stack([n, delta, cross(n, delta)])
-        cylinder, piston = leg_bodies(leg)
-        found[cylinder] = _frame(axes, start)
-        found[piston] = _frame(axes, start + delta * np.linalg.norm(end - start))
+        lower, upper = leg_bodies(leg)
+        if leg["slider"] is None:
+            found[lower] = _frame(axes, start)
+            found[upper] = _frame(axes, start + delta * np.linalg.norm(end - start))
+        else:
+            found[lower] = _frame(np.eye(3), start)
+            found[upper] = _frame(axes, start)
     for k, rod in enumerate(geometry["rods"]):
         line, n = unit(rod["axis"]), normals[k]
         found[rod_body(rod)] = _frame(np.column_stack([line, n, cross(line, n)]), rod["point"])
     return found
+
+
+def _base_joint(leg: Mapping[str, Any], end: Array) -> Array:
+    """Where a leg's base joint is, with its platform joint at `end`.
+
+    Of a slider it is one of the two points on the rail that are a strut's length away: the one from which
+    the strut leans along the axis (branch 1) or against it (-1). NaN where there is none.
+    """
+    start, slider = np.array(leg["base"]["point"]), leg["slider"]
+    if slider is None:
+        return start
+    axis = unit(slider["axis"])
+    nearest = start + axis * (axis @ (end - start))
+    with np.errstate(invalid="ignore"):
+        half_chord = np.sqrt(slider["strut"] ** 2 - np.sum((end - nearest) ** 2))
+    return np.asarray(nearest - slider["branch"] * half_chord * axis)
 
 
 def _normal(turning: Turning | None, pose: Array, delta: Array) -> Array:

@@ -1,8 +1,8 @@
 """A mechanism as links, elementary joints and loop closures, which any multibody engine can build.
 
 Made from the mechanism file's numbers and what the file's format says of them, without Polypod's equations
-of motion. Every leg hangs on the base or on its rod, the platform floats, and the platform joints close the
-loops [T59].
+of motion. Every leg hangs on the base, on its rod or on its carriage, the platform floats, and the platform
+joints close the loops [T59].
 """
 
 from __future__ import annotations
@@ -36,6 +36,8 @@ Array = NDArray[np.float64]
 X, Y, Z = np.eye(3)
 """Axes of a leg's links, n, δ, n×δ; and of a rod's: L, n, L×n."""
 POINT = np.zeros(3)
+CARRIAGE = 0.1
+"""Radius of gyration of a carriage, by the length of its strut."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,16 +81,32 @@ class Closure:
 
 @dataclass(frozen=True, eq=False)
 class LegParts:
-    """The links of a leg, and its prismatic joint."""
+    """The links of a leg, its prismatic and its base joint."""
 
     name: str
     cylinder: str
+    """Of a slider the carriage."""
     piston: str
+    """Of a slider the strut."""
+    slide: str
+    """The link that the prismatic joint moves: the piston, or the carriage."""
+    hinge: str
+    """The link that the base joint turns: the cylinder, or the strut."""
     actuated: bool
-    length: float
-    """Distance from B to b where the joint is at zero, m."""
+    coordinate: float
+    """Distance from B to b, or place of the carriage on its rail, where the prismatic joint is at zero, m."""
     spins: bool
     """Whether the leg may turn freely about its own axis."""
+    rail: tuple[Array, Array] | None
+    """(3,) each: the point and the unit vector of a slider's rail, base axes."""
+
+    def coordinate_at(self, placements: Placements) -> float:
+        """The prismatic joint's coordinate with the links at `placements`, m."""
+        first, second = (placements[body][:3, 3] for body in (self.cylinder, self.piston))
+        if self.rail is None:
+            return float(np.linalg.norm(second - first))
+        point, axis = self.rail
+        return float(axis @ (first - point))
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,17 +145,12 @@ def describe(mech: Mechanism) -> Multibody:
     zero = placements(geometry, mech.home, zero=True)
     bodies, closures, parts = _rods(geometry, zero), [], []
     for leg in geometry["legs"]:
-        cylinder, piston = leg_bodies(leg)
-        below, rod = leg["base"], leg["base"]["rod"]
-        parent = BASE if rod is None else rod_body(geometry["rods"][rod])
-        bodies.append(_body(cylinder, parent, zero, _base_freedoms(below, zero[cylinder]), leg["cylinder"]))
-        bodies.append(_body(piston, cylinder, zero, (Freedom("prismatic", Y),), leg["piston"]))
-        ends = (POINT, np.array(leg["platform"]["point"]))
+        part = _leg_parts(geometry, leg, zero)
+        bodies += (_telescope if part.rail is None else _slider)(geometry, leg, part, zero)
         squares = _platform_squares(leg["platform"])
-        closures.append(Closure(f"leg {leg['name']} platform joint", (piston, PLATFORM), ends, squares))
-        length = float(np.linalg.norm(zero[piston][:3, 3] - zero[cylinder][:3, 3]))
-        spins = turning_of(geometry, leg) is None
-        parts.append(LegParts(leg["name"], cylinder, piston, leg["actuated"], length, spins))
+        name = f"leg {part.name} platform joint"
+        closures.append(Closure(name, (part.piston, PLATFORM), _leg_ends(leg), squares))
+        parts.append(part)
     bodies.append(_body(PLATFORM, BASE, zero, (Freedom("free", POINT),), geometry["platform"]))
     return Multibody(
         name=mech.name,
@@ -154,17 +167,17 @@ def describe(mech: Mechanism) -> Multibody:
 def release(tree: Multibody) -> Multibody:
     """The same bodies with the platform set free: how they move off the constraints, by convention [T62].
 
-    Each leg follows its point of the platform and turns by the joint that keeps it from spinning, the base
-    joint if it does; a rod follows the first leg that it carries.
+    Each leg follows its point of the platform, a carriage on its rail, and turns by the joint that keeps it
+    from spinning, the base joint if it does; a rod follows the first leg that it carries.
     """
     bodies, closures = [], []
-    cylinders = {leg.cylinder for leg in tree.legs}
+    parents = {leg.hinge: BASE if leg.rail is None else leg.cylinder for leg in tree.legs}
     for body in tree.bodies:
         ball = (Freedom("spherical", POINT),)
-        bodies.append(replace(body, parent=BASE, freedoms=ball) if body.name in cylinders else body)
+        freed = body.name in parents
+        bodies.append(replace(body, parent=parents[body.name], freedoms=ball) if freed else body)
     for leg, parts in zip(tree.geometry["legs"], tree.legs, strict=True):
-        ends = (POINT, np.array(leg["platform"]["point"]))
-        closures.append(Closure(f"leg {parts.name} end", (parts.piston, PLATFORM), ends, ()))
+        closures.append(Closure(f"leg {parts.name} end", (parts.piston, PLATFORM), _leg_ends(leg), ()))
         turning = turning_of(tree.geometry, leg)
         if turning is not None:
             # U: n is square to the axis; R and F: n is the axis, or n×δ is square to it.
@@ -235,8 +248,57 @@ def _body(
     return Body(name, parent, zero[name], freedoms, float(given["mass"]), center, inertia)
 
 
+def _leg_parts(geometry: Mapping[str, Any], leg: Mapping[str, Any], zero: Placements) -> LegParts:
+    first, second = leg_bodies(leg)
+    slider, spins = leg["slider"], turning_of(geometry, leg) is None
+    rail = None if slider is None else (np.array(leg["base"]["point"]), unit(slider["axis"]))
+    slide, hinge = (second, first) if rail is None else (first, second)
+    parts = LegParts(leg["name"], first, second, slide, hinge, leg["actuated"], 0.0, spins, rail)
+    return replace(parts, coordinate=parts.coordinate_at(zero))
+
+
+def _leg_ends(leg: Mapping[str, Any]) -> tuple[Array, Array]:
+    """The platform joint in the axes of the piston, which begins there, or strut, and of the platform."""
+    reach = 0.0 if leg["slider"] is None else leg["slider"]["strut"]
+    return reach * Y, np.array(leg["platform"]["point"])
+
+
+def _telescope(
+    geometry: Mapping[str, Any], leg: Mapping[str, Any], parts: LegParts, zero: Placements
+) -> list[Body]:
+    """Base or rod, base joint, cylinder, prismatic joint, piston."""
+    rod = leg["base"]["rod"]
+    parent = BASE if rod is None else rod_body(geometry["rods"][rod])
+    turns = _base_freedoms(leg["base"], zero[parts.cylinder])
+    slide = (Freedom("prismatic", Y),)
+    return [
+        _body(parts.cylinder, parent, zero, turns, leg["cylinder"]),
+        _body(parts.piston, parts.cylinder, zero, slide, leg["piston"]),
+    ]
+
+
+def _slider(
+    geometry: Mapping[str, Any], leg: Mapping[str, Any], parts: LegParts, zero: Placements
+) -> list[Body]:
+    """Base, prismatic joint, carriage, base joint, strut."""
+    carriage, strut = leg["slider"]["carriage"], leg["piston"]
+    if carriage is not None:
+        # It does not turn, so that its inertia is of no effect; but engines want some.
+        side = CARRIAGE * float(leg["slider"]["strut"])
+        carriage = {**carriage, "inertia": carriage["mass"] * side**2 * np.eye(3)}
+    if strut is not None:
+        # The file counts from the platform joint.
+        strut = {**strut, "center": strut["center"] + _leg_ends(leg)[0]}
+    rail = (Freedom("prismatic", unit(leg["slider"]["axis"])),)
+    turns = _base_freedoms(leg["base"], zero[parts.piston])
+    return [
+        _body(parts.cylinder, BASE, zero, rail, carriage),
+        _body(parts.piston, parts.cylinder, zero, turns, strut),
+    ]
+
+
 def _base_freedoms(joint: Mapping[str, Any], zero: Array) -> tuple[Freedom, ...]:
-    """Freedoms of a base joint, from the base or rod to the cylinder with the frame `zero`."""
+    """Freedoms of a base joint, from base, rod or carriage to the cylinder or strut with the frame `zero`."""
     about_n = Freedom("revolute", X)
     match joint["joint"]:
         case "S":

@@ -12,7 +12,7 @@ from polypod.tables import Table
 def data_tables(mech: Mechanism) -> list[Table]:
     """Joints, links, rods, load and the rest of the settings."""
     spec = mech.geometry
-    tables = (_joints(mech, spec), _rods(spec), _links(mech, spec), _settings(spec))
+    tables = (_joints(mech, spec), _rails(spec), _rods(spec), _links(mech, spec), _settings(spec))
     return [table for table in tables if table.rows]
 
 
@@ -39,13 +39,16 @@ def _rods(spec: dict[str, Any]) -> Table:
 def _links(mech: Mechanism, spec: dict[str, Any]) -> Table:
     bodies = [("platform", spec["platform"]), *((f"rod {rod['name']}", rod["body"]) for rod in spec["rods"])]
     for name, leg in zip(mech.leg_names, spec["legs"], strict=True):
-        bodies += [(f"{part} {name}", leg[part]) for part in ("cylinder", "piston")]
+        if leg["slider"] is None:
+            bodies += [(f"{part} {name}", leg[part]) for part in ("cylinder", "piston")]
+        else:
+            bodies += [(f"carriage {name}", leg["slider"]["carriage"]), (f"strut {name}", leg["piston"])]
     rows = [
         (
             name,
             f"{body['mass']:g}",
             _vector([1e3 * c for c in body["center"]], digits=5),
-            *(f"{body['inertia'][i][j]:.4g}" for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))),
+            *_moments(body),
         )
         for name, body in bodies
         if body is not None
@@ -53,6 +56,29 @@ def _links(mech: Mechanism, spec: dict[str, Any]) -> Table:
     inertia = tuple(f"I_{axes}>" for axes in ("xx", "yy", "zz", "xy", "xz", "yz"))
     headers = ("link", "mass / kg>", "mass centre / mm", *inertia)
     return Table("Links, each in its own axes; inertia about the mass centre, kg m²", headers, rows)
+
+
+def _moments(body: dict[str, Any]) -> list[str]:
+    """Six components of the inertia; none for a carriage."""
+    if "inertia" not in body:
+        return [""] * 6
+    entries = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
+    return [f"{body['inertia'][i][j]:.4g}" for i, j in entries]
+
+
+def _rails(spec: dict[str, Any]) -> Table:
+    rows = [
+        (
+            leg["name"],
+            _vector(leg["slider"]["axis"], digits=4),
+            f"{1e3 * leg['slider']['strut']:.2f}",
+            f"{leg['slider']['branch']:+.0f}",
+        )
+        for leg in spec["legs"]
+        if leg["slider"] is not None
+    ]
+    headers = ("leg", "axis", "strut / mm>", "branch>")
+    return Table("Rails, through the base points, and struts", headers, rows)
 
 
 def _settings(spec: dict[str, Any]) -> Table:

@@ -159,21 +159,22 @@ def _coordinate(name: str) -> str:
 # --- leg by leg ---------------------------------------------------------------------------------------------
 
 
-def leg_charts(data: xr.Dataset, leg: int) -> list[Chart]:
-    """How one leg turns, how its links move, and the angles of its joints."""
+def leg_charts(data: xr.Dataset, leg: int, links: tuple[str, str]) -> list[Chart]:
+    """How one leg turns, how its two links move, and the angles of its joints."""
     time = data["time"].to_numpy()
 
     def three(name: str, label: str, symbol: str, unit: str, scale: float = 1.0) -> Panel:
         curves = tuple(f"${symbol}{c}}}$" for c in _COMPONENTS)
         return Panel(label, unit, scale * data[name].to_numpy()[:, leg], curves)
 
+    first, second = links
     panels = [
         three("leg_omega", r"angular velocity $\omega_r$", r"\omega_{r", "rad s$^{-1}$"),
         three("leg_eps", r"angular acceleration $\varepsilon_r$", r"\varepsilon_{r", "rad s$^{-2}$"),
         _joint_angles(data, leg),
-        three("piston_velocity", "piston's velocity $v_p$", "v_{p", "mm s$^{-1}$", 1e3),
-        three("piston_acceleration", "piston's acceleration $a_p$", "a_{p", "mm s$^{-2}$", 1e3),
-        three("cylinder_acceleration", "cylinder's acceleration $a_q$", "a_{q", "mm s$^{-2}$", 1e3),
+        three("piston_velocity", f"{second}'s velocity $v_p$", "v_{p", "mm s$^{-1}$", 1e3),
+        three("piston_acceleration", f"{second}'s acceleration $a_p$", "a_{p", "mm s$^{-2}$", 1e3),
+        three("cylinder_acceleration", f"{first}'s acceleration $a_q$", "a_{q", "mm s$^{-2}$", 1e3),
     ]
     return [Chart(panel, time) for panel in panels]
 

@@ -16,6 +16,7 @@ from markupsafe import Markup
 from plotly.offline import get_plotlyjs
 
 from polypod import tables
+from polypod.drives import links_of_leg
 from polypod.mechanism import Mechanism
 from polypod.report import figures, groups
 from polypod.report.charts import Chart, Series
@@ -168,13 +169,16 @@ def _motion(mech: Mechanism, along: Along, series: Series) -> dict[str, Any]:
         "outcomes": tables.outcomes_table(facts),
         "poses": figures.poses_picture(mech, solution),
         "fig4": shown(groups.motion_charts(solution)),
-        "actuators": actuators_table(along.actuators),
+        "actuators": actuators_table(along.actuators, mech.leg_letters),
         "actuator_charts": shown(groups.actuator_charts(mech, solution)),
         "reactions": reactions_table(along.reactions),
         "reaction_charts": shown(groups.reaction_charts(mech, along.reactions)),
         "undetermined": bool(along.reactions.undetermined.any()),
         "singularity_charts": shown(groups.singularity_charts(mech, solution)),
-        "legs": [(name, shown(groups.leg_charts(data, i))) for i, name in enumerate(mech.leg_names)],
+        "legs": [
+            (name, shown(groups.leg_charts(data, i, links_of_leg(mech.leg_letters[i]))))
+            for i, name in enumerate(mech.leg_names)
+        ],
         "source": along.source,
     }
 

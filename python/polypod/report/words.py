@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
+from polypod.drives import slides, word
 from polypod.report.content import Along, Content
 from polypod.tables import Table, fixed, outcome, range_mm, significant
 from polypod.units import coordinate_unit, readable
@@ -89,8 +91,8 @@ def _of_motion(along: Along) -> list[tuple[str, str]]:
     return found
 
 
-def actuators_table(rows: list[dict[str, Any]]) -> Table:
-    """What the motion asks of each actuator."""
+def actuators_table(rows: list[dict[str, Any]], letters: Sequence[str]) -> Table:
+    """What the motion asks of each actuator; `letters` are the joints of all legs."""
     cells = []
     for row in rows:
         force, speed, power, stroke = (row[key] for key in ("force", "speed", "power", "stroke"))
@@ -110,12 +112,14 @@ def actuators_table(rows: list[dict[str, Any]]) -> Table:
         )
     headers = (
         *("leg", "peak force / N>", "rms / N>", "peak speed / mm/s>", "rms / mm/s>", "peak power / W>"),
-        *("rms / W>", "length / mm>", "stroke used / mm>", "of the stroke>"),
+        *("rms / W>", f"{word(letters)} / mm>", "stroke used / mm>", "of the stroke>"),
     )
     note = (
         "Peaks are the values of largest size, with their signs: forces are positive when they push the "
         "platform away, speeds when the leg becomes longer, powers when the actuator drives."
     )
+    if any(map(slides, letters)):
+        note += " Of a slider, forces and speeds are positive along its rail's axis."
     return Table("Actuators", headers, cells, note)
 
 

@@ -17,14 +17,14 @@ from exudyn.rigidBodyUtilities import AngularVelocity2EulerParameters_t, Rotatio
 from numpy.typing import NDArray
 
 from polypod.multibody.placement import BASE, PLATFORM, Placements, across, cross
-from polypod.multibody.tree import POINT, Body, Multibody
+from polypod.multibody.tree import POINT, Body, Multibody, Y
 from polypod.status import Status
 from polypod.verify.forced import Forced, inertial
 from polypod.verify.rows import Row, Slide, Start
 
 Array = NDArray[np.float64]
 Drive = Callable[[float], tuple[Array, Array]]
-"""Time, s → forces of the legs (L,), N, positive apart; load at o (6,), base axes, N and N m."""
+"""Time, s → forces of the legs (L,), N, positive apart or along the rail; load at o (6,), base axes, SI."""
 
 NEWTON = 1e-10
 """Relative and absolute tolerance of the integrator's Newton iteration."""
@@ -159,10 +159,14 @@ class System:
             return held[t]
 
         for i, leg in enumerate(self.tree.legs):
-            for body, sign in ((leg.piston, 1.0), (leg.cylinder, -1.0)):
+            # In the links' axes: along the leg, apart, or along the rail, on the carriage alone.
+            pushed = (
+                ((leg.piston, Y), (leg.cylinder, -Y)) if leg.rail is None else ((leg.slide, leg.rail[1]),)
+            )
+            for body, way in pushed:
 
-                def push(mbs: Any, t: float, load: Any, i: int = i, sign: float = sign) -> list[float]:
-                    return [0.0, sign * float(at(t)[0][i]), 0.0]
+                def push(mbs: Any, t: float, load: Any, i: int = i, way: Array = way) -> list[float]:
+                    return (float(at(t)[0][i]) * way).tolist()  # type: ignore[no-any-return]
 
                 marker = self._marker(body, np.eye(3), POINT)
                 mbs.AddLoad(
@@ -237,7 +241,7 @@ class System:
             return None
         poses = np.array([placed[PLATFORM] for placed in records.values()])
         lengths = np.array(
-            [[_distance(placed, leg) for leg in self.tree.legs] for placed in records.values()]
+            [[leg.coordinate_at(placed) for leg in self.tree.legs] for placed in records.values()]
         )
         closure = max(self.twin.links.worst(placed) for placed in records.values())
         return Track(poses, lengths, closure)
@@ -252,10 +256,6 @@ class System:
         )
         frame[:3, 3] = self.mbs.GetObjectOutputBody(number, _OUTPUT.Position, point, _NOW)
         return frame
-
-
-def _distance(placed: Placements, leg: Any) -> float:
-    return float(np.linalg.norm(placed[leg.piston][:3, 3] - placed[leg.cylinder][:3, 3]))
 
 
 def _axis_in_column(axis: Array, column: int) -> Array:

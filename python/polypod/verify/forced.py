@@ -58,7 +58,7 @@ class Forced(ABC):
         found |= {
             "platform_acceleration": platform[:3],
             "platform_eps": platform[3:],
-            "leg_eps": moved[cylinders, 3:],
+            "leg_eps": moved[pistons, 3:],
             "piston_acceleration": moved[pistons, :3],
             "cylinder_acceleration": moved[cylinders, :3],
             "rod_eps": moved[[self.numbers[rod] for rod in self.tree.rods], 3:],

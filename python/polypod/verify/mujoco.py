@@ -106,7 +106,7 @@ class Model:
         self._put(start)
         geometry = self.tree.geometry
         for leg, force in zip(self.tree.legs, forces, strict=True):
-            data.qfrc_applied[self._joint(leg.piston, 0).dofadr[0]] = force / self.unit
+            data.qfrc_applied[self._joint(leg.slide, 0).dofadr[0]] = force / self.unit
         damping = np.repeat([geometry["linear_damping"], geometry["angular_damping"]], 3)
         push = (wrench - damping * twist) / (geometry["efficiency"] * self.unit)
         point = start.placements[PLATFORM][:3, 3]

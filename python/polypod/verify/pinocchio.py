@@ -81,7 +81,7 @@ class Tree:
         self.platform = np.arange(floating.idx_v, floating.idx_v + 6)
         self.passive = np.setdiff1d(np.arange(self.model.nv), self.platform)
         """Velocities of all joints but the floating platform, the prismatic ones too."""
-        joints = [self._joints[leg.piston][0] for leg in tree.legs]
+        joints = [self._joints[leg.slide][0] for leg in tree.legs]
         self.slides = np.array([self.model.joints[joint].idx_v for joint in joints])
         """Entry of each leg's prismatic joint in velocities."""
         self.slide_values = np.array([self.model.joints[joint].idx_q for joint in joints])
@@ -325,11 +325,11 @@ class Twin:
         rods = [tree.frames[rod] for rod in tree.tree.rods]
         point, turn = slice(0, 3), slice(3, 6)
         return {
-            "lengths": np.array([leg.length for leg in parts]) + moved.q[tree.slide_values],
+            "lengths": np.array([leg.coordinate for leg in parts]) + moved.q[tree.slide_values],
             "rates": moved.v[legs],
             "accelerations": moved.a[legs],
-            "leg_omega": of(tree.velocity, cylinders, turn),
-            "leg_eps": of(tree.acceleration, cylinders, turn),
+            "leg_omega": of(tree.velocity, pistons, turn),
+            "leg_eps": of(tree.acceleration, pistons, turn),
             "piston_velocity": of(tree.velocity, pistons, point),
             "piston_acceleration": of(tree.acceleration, pistons, point),
             "cylinder_velocity": of(tree.velocity, cylinders, point),

@@ -14,6 +14,7 @@ import numpy as np
 import trimesh
 from numpy.typing import NDArray
 
+from polypod import drives
 from polypod.answers import AssemblyModes
 from polypod.bodies import LinkPlaces
 from polypod.errors import PolypodError
@@ -41,6 +42,7 @@ class Overlays:
     def __init__(self, server: viser.ViserServer, model: Model, arrows: Arrows, inbox: Inbox) -> None:
         self._server, self._model, self._arrows, self._inbox = server, model, arrows, inbox
         self._places = LinkPlaces(model.mech)
+        self._of = drives.words(model.mech.leg_letters)
         self._busy = threading.Lock()
         self._workspace: Any = None
         self._modes: list[Any] = []
@@ -54,7 +56,7 @@ class Overlays:
     def _add_arrows(self) -> None:
         gui, scene, mech = self._server.gui, self._server.scene, self._model.mech
         texts = {
-            "forces": ("Active forces", "Black: of the legs on the platform."),
+            "forces": ("Active forces", "Black: of the legs on the platform, or on carriages."),
             "wrench": ("Constraint wrench", "At o: force violet, torque ochre."),
             "loose": ("Uncontrolled motion", "Magenta, near singular poses: what the locked legs let go."),
         }
@@ -73,7 +75,7 @@ class Overlays:
 
     def _add_workspace(self) -> None:
         gui, mech = self._server.gui, self._model.mech
-        reach = 2e3 * LATERAL * float(mech.inverse_kinematics(mech.home).lengths.mean())
+        reach = 2e3 * LATERAL * float(drives.spans(mech).mean())
         step = round(min(max(reach / 30.0, _STEPS[0]), _STEPS[1]))
         with gui.add_folder("Workspace", expand_by_default=True):
             self._step = gui.add_slider("step / mm", _STEPS[0], _STEPS[1], 1.0, float(step))
@@ -117,7 +119,7 @@ class Overlays:
     def _add_modes(self) -> None:
         gui = self._server.gui
         with gui.add_folder("Assembly modes", expand_by_default=True):
-            self._all = gui.add_button("All poses with these lengths")
+            self._all = gui.add_button(f"All poses with these {self._of.removeprefix('leg ')}")
             self._go = gui.add_dropdown("Go to", ("–",), visible=False)
             self._away = gui.add_button("Put them away", color="gray", visible=False)
             self._told = gui.add_html("")
@@ -165,7 +167,7 @@ class Overlays:
         status = Status(int(modes.status))
         more = f" {count} of them are drawn." if count < total else ""
         doubt = "" if status is Status.OK else f" {status.message}."
-        self._say(self._told, f"{total} poses have these leg lengths.{more}{doubt}")
+        self._say(self._told, f"{total} poses have these {self._of}.{more}{doubt}")
 
     def _step_back(self, width: float, depth: float) -> None:
         """Moves the cameras of all pages back until they see a row of this width."""

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
+from polypod import drives
 from polypod.viewer import words
 from polypod.viewer.player import SPEEDS, Player
 from polypod.viewer.state import Model, View
@@ -76,7 +77,7 @@ class Panel:
         self.tabs = gui.add_tab_group()
         with self.tabs.add_tab("Coordinates"):
             self._add_coordinates()
-        with self.tabs.add_tab("Leg lengths"):
+        with self.tabs.add_tab(drives.words(model.mech.leg_letters).capitalize()):
             self._lengths = [self._length_slider(i) for i in range(model.mech.n_legs)]
         if player is not None:
             with self.tabs.add_tab("Motion"):
@@ -135,7 +136,8 @@ class Panel:
         start = min(max(round(now, 1), low), high)
         active = bool(model.mech.actuated[leg])
         label = f"{model.mech.leg_names[leg]} / mm"
-        hint = None if active else "A passive leg: its length follows from the others."
+        what = drives.word([model.mech.leg_letters[leg]])
+        hint = None if active else f"A passive leg: its {what} follows from the others."
         handle = self._gui.add_slider(label, low, high, _STEP, start, disabled=not active, hint=hint)
         slider = _Slider(handle, ("length", leg), 1e3, _STEP)
 

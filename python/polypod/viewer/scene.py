@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from polypod.bodies import PLATFORM, STEEL, Link, leg_radii
 from polypod.mechanism import Mechanism
+from polypod.rails import way
 from polypod.singularity import NEAR_SINGULAR
 from polypod.style import SKY, YELLOW
 from polypod.viewer.state import Level, Model, View
@@ -82,7 +83,7 @@ class Machine:
                     smooth.faces,
                     color=rgb(piece.color),
                 )
-                if link.kind in ("cylinder", "piston") and piece.color == STEEL:
+                if link.kind in ("cylinder", "piston", "strut") and piece.color == STEEL:
                     self._legs[link.index].append(node)
                 elif piece.color == PLATFORM:
                     self._platform.append(node)
@@ -229,11 +230,12 @@ def add_triads(api: viser.SceneApi, mech: Mechanism) -> tuple[viser.FrameHandle,
 
 
 def add_labels(api: viser.SceneApi, mech: Mechanism) -> list[viser.LabelHandle]:
-    """Names of the legs at their base joints."""
+    """Names of the legs at their base joints, or at the ends of their rails."""
     size = mech.characteristic_length
     labels = []
+    home = mech.inverse_kinematics(mech.home).lengths
     for i, leg in enumerate(mech.geometry["legs"]):
-        point = np.array(leg["base"]["point"])
+        point = np.array(leg["base"]["point"]) if leg["slider"] is None else way(leg, float(home[i]))[0]
         at = point * (1.0 + 0.25 * size / max(float(np.linalg.norm(point)), size))
         labels.append(api.add_label(f"/labels/{i}", mech.leg_names[i], position=tuple(at)))
     return labels

@@ -11,8 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from polypod.bodies import LinkPlaces, links_of
+from polypod.drives import spans, word
 from polypod.errors import PolypodError, UnknownNameError
 from polypod.mechanism import Mechanism
+from polypod.rails import unit
 from polypod.singularity import NEAR_SINGULAR, TOLERANCE, SingularityKind
 from polypod.status import Status
 from polypod.units import KIND_OF_COORDINATE, coordinate_unit, readable
@@ -72,7 +74,7 @@ class View:
     lengths: Array
     """(n,), m."""
     joints: Array
-    """(n, 3): the platform joints b, m."""
+    """(n, 3): where the active forces are drawn, m: at the platform joints b, of sliders at the carriages."""
     directions: Array
     """(n, 3)."""
     slack: Array
@@ -126,6 +128,7 @@ class Model:
         self._legs = self.mech.geometry["legs"]
         self._limits = self.mech.limit_list
         self._base = np.array([leg["base"]["point"] for leg in self._legs])
+        self._rails = np.array([unit((leg["slider"] or {"axis": [1, 0, 0]})["axis"]) for leg in self._legs])
         self._names = {**self.mech.coordinate_sets, "pose": self._independent()}
         self._home_lengths = self.mech.inverse_kinematics(self.mech.home).lengths
         self._row: int | None = None
@@ -159,7 +162,7 @@ class Model:
         middle = 0.0
         if kind == "length":
             middle = float(self.mech.coordinates(self.mech.home, self.set)[name])
-            half = LATERAL * float(self._home_lengths.mean())
+            half = LATERAL * float(spans(self.mech).mean())
         low, high = middle - half, middle + half
         if self.track is not None and name in self.track.coordinates and self.set == self.track.set:
             values = self.track.coordinates[name]
@@ -167,12 +170,13 @@ class Model:
         return low, high
 
     def length_range(self, leg: int) -> tuple[float, float]:
-        """Least and greatest length that the page offers for a leg, m: a little more than its stroke."""
+        """Least and greatest length or place that is offered for a leg, m: a little beyond its stroke."""
         low, high = self.mech.stroke[leg]
         if not np.isfinite(high):
-            home = float(self._home_lengths[leg])
-            return 0.5 * home, 1.5 * home
-        return max(low - 0.1 * (high - low), 0.0), high + 0.1 * (high - low)
+            home, half = float(self._home_lengths[leg]), 0.5 * float(spans(self.mech)[leg])
+            return home - half, home + half
+        beyond = 0.1 * (high - low)
+        return low - beyond if self.mech.sliders[leg] else max(low - beyond, 0.0), high + beyond
 
     # --- moving --------------------------------------------------------------------------------------------
 
@@ -202,17 +206,18 @@ class Model:
     def set_length(self, leg: int, value: float) -> bool:
         """Moves one leg, the others kept, in the present assembly mode; whether there is such a pose."""
         name = self.mech.leg_names[leg]
+        what, sliding = word([self.mech.leg_letters[leg]]), bool(self.mech.sliders[leg])
         if not self.mech.actuated[leg]:
-            return self._refuse(f"Leg {name} is passive: its length follows from the others.")
-        if not np.isfinite(value) or value <= 0.0:
-            return self._refuse(f"Leg {name} cannot be {value} m long.")
+            return self._refuse(f"Leg {name} is passive: its {what} follows from the others.")
+        if not np.isfinite(value) or (value <= 0.0 and not sliding):
+            return self._refuse(f"The {what} of leg {name} cannot be {value} m.")
         lengths = self.mech.inverse_kinematics(self.pose).lengths.copy()
         lengths[leg] = value
         found = self.mech.forward_kinematics(lengths, self.pose)
         status = Status(int(found.status))
         if not status.has_answer or status is Status.MODE_JUMP:
             return self._refuse(
-                f"Leg {name} cannot be {readable(value, 'm')} long while the others keep their lengths: "
+                f"The {what} of leg {name} cannot be {readable(value, 'm')} while the others keep theirs: "
                 f"{status.message}."
             )
         return self._move(found.pose)
@@ -260,14 +265,18 @@ class Model:
         kind = SingularityKind(int(near.kind))
         loose = kind in (SingularityKind.ACTUATION, SingularityKind.CONSTRAINT)
         loose |= kind is SingularityKind.CONSTRAINT_VANISHES
+        frames, sliding = self._places.at(pose).frames, mech.sliders[:, None]
+        # The first link of each leg is at its base joint.
+        first = 1 + len(mech.rod_names)
+        carriages = frames[first : first + 2 * mech.n_legs : 2, :3, 3]
         known = bool(np.isfinite(near.axis).all() and np.isfinite(near.point).all())
         screw = Screw(near.point, near.axis, float(near.pitch), near.twist[:3]) if loose and known else None
         return View(
             pose=pose,
-            frames=self._places.at(pose).frames,
+            frames=frames,
             lengths=legs.lengths,
-            joints=self._base + legs.vectors,
-            directions=legs.directions,
+            joints=np.where(sliding, carriages, self._base + legs.vectors),
+            directions=np.where(sliding, self._rails, legs.directions),
             slack=self._slack(limits.relative),
             forces=dynamics.forces,
             wrench=reactions.constraint_wrench,

@@ -86,11 +86,12 @@ def _fixed(value: float, decimals: int = 1) -> str:
 def _leg(view: View, mech: Mechanism, leg: int) -> dict[str, Any]:
     low, high = (float(end) for end in mech.stroke[leg])
     length, force, level = float(view.lengths[leg]), float(view.forces[leg]), view.leg_levels[leg]
-    part = (length - low) / (high - low)
+    bounded = math.isfinite(low) and math.isfinite(high)
+    part = (length - low) / (high - low) if bounded else 0.0
     return {
         "name": mech.leg_names[leg],
         "color": color_of(leg),
-        "at": 100.0 * min(max(part, 0.0), 1.0) if math.isfinite(high) else None,
+        "at": 100.0 * min(max(part, 0.0), 1.0) if bounded else None,
         "shade": GREY if level is Level.FINE else LEVEL_COLORS[level],
         "length": 1e3 * length,
         "force": _fixed(force) if mech.actuated[leg] else "passive",
