@@ -52,7 +52,7 @@ class Known(NamedTuple):
 
 
 GENERAL = "six legs without constraints"
-ROD = "six, of which five legs on a rod leave its spin: Borràs, Thomas, Torras 2010"
+ROD = "of six, five legs on a rod leave its spin: Borràs, Thomas, Torras 2010; 8 solutions: three quadrics"
 LEAST = "one constraint of the leg that is not SPS, UPS or PSS"
 KNOWN = {
     "2rpu-spr": Known(3, "2R1T: Rotational axes analysis of the 2-RPU/SPR 2R1T parallel mechanism"),
@@ -76,12 +76,12 @@ KNOWN = {
     "hexaglide": Known(6, GENERAL, 40),
     "linapod": Known(6, GENERAL, 40),
     "linuxcnc-6-3": Known(6, GENERAL, 16),
-    "linuxcnc-pentakins": Known(6, ROD),
+    "linuxcnc-pentakins": Known(6, ROD, 8),
     "lu-3spu-2rpu-r": Known(5, "Lu, Liu, Zhang, Ye, Wang: Eq. 1"),
     "lu-3spu-2rpu-r-turned": Known(5, "as lu-3spu-2rpu-r: the same joints"),
     "octahedral-3-3": Known(6, GENERAL, 16),
-    "pentapod-5-spu": Known(6, ROD),
-    "pentapod-5-ups": Known(6, ROD),
+    "pentapod-5-spu": Known(6, ROD, 8),
+    "pentapod-5-ups": Known(6, ROD, 8),
     "tricept": Known(3, "two tilts and a sliding: Neumann's patent"),
     "tsai-6-sps": Known(6, GENERAL),
     "ups-hexapod": Known(6, GENERAL),
@@ -230,7 +230,7 @@ def beside(mech: pp.Mechanism, pose: Array) -> Array:
 
 
 def apart(mech: pp.Mechanism, a: Array, b: Array) -> Array:
-    """(...): largest difference of entries, positions by the characteristic length; of an idle line, if any."""
+    """(...): largest difference of entries, positions by the characteristic length; of an idle line."""
     for idle in mech.mobility().idle:
         a, b = (np.concatenate([p @ [*idle.point, 1.0], p @ [*idle.axis, 0.0]], axis=-1) for p in (a, b))
         return abs(a - b).max(axis=-1) / min(1.0, mech.characteristic_length)

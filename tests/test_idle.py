@@ -1,4 +1,4 @@
-"""Freedoms that no leg feels by design: the spin of a rod that all legs end on, or of legs about a line of the base."""
+"""Freedoms that no leg feels by design: the spin of a rod that all legs end on, or about a line below."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ def line(mech: pp.Mechanism, pose: Array) -> tuple[Array, Array]:
     [idle] = mech.mobility().idle
     point, axis = np.array(idle.point), np.array(idle.axis)
     if idle.body == "base":
-        return np.broadcast_to(point, pose.shape[:-2] + (3,)), np.broadcast_to(axis, pose.shape[:-2] + (3,))
+        return np.broadcast_to(point, (*pose.shape[:-2], 3)), np.broadcast_to(axis, (*pose.shape[:-2], 3))
     return pose[..., :3, 3] + pose[..., :3, :3] @ point, pose[..., :3, :3] @ axis
 
 
@@ -133,7 +133,11 @@ def test_two_and_three_idle_freedoms() -> None:
     assert [freedom.body for freedom in idle] == ["platform"] * 3
     axes = np.array([freedom.axis for freedom in idle])
     assert axes @ axes.T == pytest.approx(np.eye(3), abs=1e-9)
-    assert [freedom.point for freedom in idle if np.linalg.norm(np.cross(np.array(freedom.point) - [0.01, 0.005, 0.02], freedom.axis)) > 1e-9] == []
+    assert [
+        freedom.point
+        for freedom in idle
+        if np.linalg.norm(np.cross(np.array(freedom.point) - [0.01, 0.005, 0.02], freedom.axis)) > 1e-9
+    ] == []
     with pytest.raises(UnsupportedError, match="one idle freedom"):
         mech.assembly_modes([0.5] * 3)
     # Base joints on a line as well: the machine swings about that, too.
@@ -153,7 +157,9 @@ def test_two_and_three_idle_freedoms() -> None:
 def test_a_leg_that_is_missing_is_no_idle_freedom() -> None:
     data = pp.load("ups-hexapod").to_dict()
     data["legs"] = data["legs"][:5]
-    with pytest.raises(pp.MechanismError, match="5 actuated legs for 6 freedoms; at least 6 legs must be actuated"):
+    with pytest.raises(
+        pp.MechanismError, match="5 actuated legs for 6 freedoms; at least 6 legs must be actuated"
+    ):
         pp.Mechanism.from_dict(data)
     # A passive leg beside the rod feels the spin, which an actuator should then hold.
     data = pp.load("pentapod-5-ups").to_dict()
@@ -283,7 +289,9 @@ def test_assembly_modes_up_to_the_spin(name: str) -> None:
 
     rng, found = np.random.default_rng(5), []
     for _ in range(150):
-        start = np.concatenate([mech.home[:3, 3] * rng.choice([-1, 1]) + 0.3 * rng.normal(size=3), rng.normal(size=4)])
+        start = np.concatenate(
+            [mech.home[:3, 3] * rng.choice([-1, 1]) + 0.3 * rng.normal(size=3), rng.normal(size=4)]
+        )
         fit = least_squares(off, start, xtol=1e-15, ftol=1e-15, gtol=1e-15)
         if abs(fit.fun).max() < 1e-10:
             at = np.eye(4)
@@ -356,7 +364,7 @@ def test_reactions_hold_with_the_torque(name: str) -> None:
 @each
 def test_derivatives_are_those_of_differences(name: str) -> None:
     mech = MECHANISMS[name]
-    pose, twist, acceleration = (part[0] for part in motions(mech))
+    pose = motions(mech)[0][0]
     names = mech.coordinate_sets["pose"]
     base = {n: float(x) for n, x in mech.coordinates(pose, "pose").items()}
     rng = np.random.default_rng(11)

@@ -183,12 +183,6 @@ BAD: dict[str, tuple[str, dict[str, Any], str, str]] = {
         "legs",
         "4 actuated legs for 5 freedoms; at least 5",
     ),
-    "too many actuators": (
-        PAPER,
-        {"legs__6": LEG | {"name": "6", "base": {"joint": "S", "point": [50.0, 0.0, 0.0]}}},
-        "legs",
-        "6 actuated legs for 5 freedoms; redundant actuation is not supported",
-    ),
     "not a number": (PAPER, {"legs__4__piston__mass": math.nan}, "legs.4.piston.mass", "is NaN"),
     "not a number in a point": (
         PAPER,

@@ -1,4 +1,4 @@
-"""More actuated legs than freedoms: forces of least size, legs that must agree, against numpy's own solutions."""
+"""More actuated legs than freedoms: least forces, legs that must agree, against numpy's own solutions."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ WRENCH = np.array([80.0, -60.0, -150.0, 6.0, -4.0, 5.0])
 
 
 def seven_legs() -> pp.Mechanism:
-    """A hexapod with a seventh leg to the middle of its platform, and a leg that carries load but is passive."""
+    """A hexapod with a seventh leg to the middle of its platform, and a passive leg with mass."""
     data = pp.load("ups-hexapod").to_dict()
     extra = {
         "base": {"joint": "U", "point": [0.2, -0.4, 0.1], "axis": [1.0, 0.4, 0.0]},
@@ -84,7 +84,7 @@ def rows(mech: pp.Mechanism, pose: Array) -> tuple[Array, Array]:
 
 
 def asked(mech: pp.Mechanism, pose: Array, twist: Array, acceleration: Array, wrench: Array) -> Array:
-    """The wrench (6,) that J^T must give, torques by the characteristic length: from the equation of motion."""
+    """The wrench (6,) that J^T must give, torques by the characteristic length: of the equation of motion."""
     terms = mech.equations_of_motion(pose, twist)
     load = terms.mass @ acceleration + (terms.coriolis + terms.damping) @ twist + terms.gravity
     load -= wrench / mech.geometry["efficiency"]
@@ -355,16 +355,28 @@ def test_determinant_is_that_of_the_square(name: str) -> None:
     pose, twist, _ = motions(mech)
     found = mech.determinant(pose, twist)
     scale, length = mech.characteristic_length, np.repeat([1.0, mech.characteristic_length], 3)
-    kinds = [kind for i, (_, kind) in enumerate(mech.mobility().constraint_rows) if i in mech.mobility().independent_rows]
+    kinds = [
+        kind
+        for i, (_, kind) in enumerate(mech.mobility().constraint_rows)
+        if i in mech.mobility().independent_rows
+    ]
     idle = len(mech.mobility().idle)
-    unit = np.array([1.0] * int(mech.actuated.sum()) + [scale] * idle + [scale if k == "D" else 1.0 for k in kinds])
+    unit = np.array(
+        [1.0] * int(mech.actuated.sum()) + [scale] * idle + [scale if k == "D" else 1.0 for k in kinds]
+    )
     J = mech.jacobian(pose) / length * unit[:, None]
     expected = np.linalg.det(np.swapaxes(J, 1, 2) @ J)
     assert found.determinant == pytest.approx(expected, rel=1e-10)
     step = 1e-6
-    ahead = np.array([mech.determinant(_moved(p, v * step)).determinant for p, v in zip(pose, twist, strict=True)])
-    behind = np.array([mech.determinant(_moved(p, -v * step)).determinant for p, v in zip(pose, twist, strict=True)])
-    assert found.rate == pytest.approx((ahead - behind) / (2 * step), rel=1e-5, abs=1e-6 * abs(found.rate).max())
+    ahead = np.array(
+        [mech.determinant(_moved(p, v * step)).determinant for p, v in zip(pose, twist, strict=True)]
+    )
+    behind = np.array(
+        [mech.determinant(_moved(p, -v * step)).determinant for p, v in zip(pose, twist, strict=True)]
+    )
+    assert found.rate == pytest.approx(
+        (ahead - behind) / (2 * step), rel=1e-5, abs=1e-6 * abs(found.rate).max()
+    )
 
 
 def _moved(pose: Array, step: Array) -> Array:
@@ -389,7 +401,9 @@ def test_derivatives_are_those_of_differences(name: str) -> None:
     q = mech.coordinates(pose, "pose")
     base = {n: float(q[n]) for n in names}
     rng = np.random.default_rng(11)
-    rates, second = ({n: float(x) for n, x in zip(names, rng.normal(size=len(names)), strict=True)} for _ in range(2))
+    rates, second = (
+        {n: float(x) for n, x in zip(names, rng.normal(size=len(names)), strict=True)} for _ in range(2)
+    )
 
     def forces(order: int, name: str, step: float) -> Array:
         parts = [dict(base), dict(rates), dict(second)]
@@ -399,7 +413,9 @@ def test_derivatives_are_those_of_differences(name: str) -> None:
         return found.forces
 
     state = mech.state(base, rates, second, guess=pose)
-    by = mech.inverse_dynamics_derivatives(state.pose, state.twist, state.acceleration, WRENCH, coordinates=names)
+    by = mech.inverse_dynamics_derivatives(
+        state.pose, state.twist, state.acceleration, WRENCH, coordinates=names
+    )
     for order, part in enumerate(("coordinates", "rates", "second_rates")):
         exact = getattr(by, f"forces_by_{part}")
         for k, n in enumerate(names):
@@ -428,7 +444,11 @@ def test_derivatives_by_geometry_are_those_of_differences(name: str) -> None:
         return other.inverse_dynamics(pose, twist, acceleration, WRENCH).forces
 
     for component, axis in enumerate("xyz"):
-        [k] = [k for k, n in enumerate(by.geometry) if n == f"leg {file['legs'][leg].get('name', leg + 1)} base point_{axis}"]
+        [k] = [
+            k
+            for k, n in enumerate(by.geometry)
+            if n == f"leg {file['legs'][leg].get('name', leg + 1)} base point_{axis}"
+        ]
         difference = (forces(component, STEP) - forces(component, -STEP)) / (2 * STEP)
         exact = by.forces_by_geometry[:, k]
         assert abs(exact - difference).max() < 1e-5 * max(abs(exact).max(), 1.0)
@@ -497,7 +517,7 @@ def test_limits_of_forces_hold_for_the_least_ones() -> None:
     for leg in data["legs"][:4]:
         leg["force"] = {"min": -100, "max": 400}
     mech = pp.Mechanism.from_dict(data)
-    pose, twist, acceleration = motions(MECHANISMS["4ups-up"])
+    pose = motions(MECHANISMS["4ups-up"])[0]
     forces = mech.inverse_dynamics(pose, np.zeros(6), np.zeros(6)).forces[:, :4]
     margins = mech.limits(pose).margins
     of_force = [k for k, limit in enumerate(mech.limit_list) if limit.unit == "N"]

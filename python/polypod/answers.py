@@ -576,7 +576,7 @@ class Published:
 
 @dataclass(frozen=True)
 class IdleFreedom:
-    """A turn of the platform that no leg feels at any pose, as the spin of a rod that all legs end on [T70]."""
+    """A turn of the platform that no leg feels at any pose: the spin of a rod that all legs end on [T70]."""
 
     body: str
     """What the line is fixed in: "platform" or "base"."""
@@ -587,9 +587,7 @@ class IdleFreedom:
 
     def __str__(self) -> str:
         point, axis = (f"({', '.join(f'{x:.6g}' for x in v)})" for v in (self.point, self.axis))
-        return (
-            f"spin about the line through {point} m along {axis}, {self.body} axes, felt by no leg"
-        )
+        return f"spin about the line through {point} m along {axis}, {self.body} axes, felt by no leg"
 
 
 @dataclass(frozen=True)
@@ -617,8 +615,8 @@ class Mobility:
     passive_legs: tuple[str, ...]
     """The legs that spin freely about their own line."""
     uncontrolled: int
-    """Freedoms, idle ones apart, that remain at generic poses with all actuators locked: zero unless the design
-    is singular."""
+    """Freedoms, idle ones apart, that remain at generic poses with all actuators locked: zero unless the
+    design is singular."""
     idle: tuple[IdleFreedom, ...]
     """Freedoms that no leg feels, by design [T70]."""
     constraint_rows: tuple[tuple[str, str], ...]

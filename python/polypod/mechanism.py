@@ -173,8 +173,7 @@ class Mechanism:
 
     @property
     def n_rows(self) -> int:
-        """Rows of J: actuated legs, idle freedoms, independent constraints; 6, or more where actuators are
-        redundant."""
+        """Rows of J: actuated legs, idle freedoms, constraints; above 6 where actuators are redundant."""
         return self._core.rows
 
     @property
@@ -273,6 +272,13 @@ class Mechanism:
                 f"{_in_words(mobility.redundant_legs)}: the parts must be made accurately, and couples in "
                 "these joints are statically indeterminate."
             )
+        if self.redundantly_actuated:
+            driven = int(self.actuated.sum())
+            notes.append(
+                f"redundant actuators: {driven} for {self.dof - len(mobility.idle)} freedoms. Their "
+                "forces are a choice, and only lengths that agree have a pose."
+            )
+        notes += [f"idle: {idle}; nothing drives or holds it." for idle in mobility.idle]
         if mobility.passive:
             notes.append(
                 f"legs {', '.join(mobility.passive_legs)} spin freely about their own line "
@@ -511,8 +517,8 @@ class Mechanism:
     ) -> Determinant:
         """Determinant of J in pure numbers, and its exact rate along a twist [T30].
 
-        With redundant actuators J has none: it is that of JᵀJ, which has no sign and is zero where J loses its
-        rank [T72].
+        With redundant actuators J has none: it is that of JᵀJ, which is never negative, and zero where J
+        loses its rank [T72].
 
         Args:
             pose: (..., 4, 4).
@@ -667,11 +673,11 @@ class Mechanism:
         SINGULAR where two modes meet, so that the pose is known to about 1e-7 only. Lengths that are negative
         or not finite give INVALID_INPUT.
 
-        Idle freedoms keep the spin of the guess [T70]. Lengths of redundant actuators must agree: the pose has
-        all of them, to 1e-6 of the characteristic length, or the status is INCONSISTENT and there is none,
-        only the `residual` of the nearest [T73]; there are no modes to jump between. A design that is singular
-        at every pose has a curve of poses for the lengths that it can have at all: the status is SINGULAR with
-        one of them, INCONSISTENT for lengths that it cannot have.
+        Idle freedoms keep the spin of the guess [T71]. Lengths of redundant actuators must agree: the pose
+        has all of them, to 1e-6 of the characteristic length, or the status is INCONSISTENT and there is
+        none, only the `residual` of the nearest [T73]; there are no modes to jump between. A design that is
+        singular at every pose has a curve of poses for the lengths that it can have at all: the status is
+        SINGULAR with one of them, INCONSISTENT for lengths that it cannot have.
 
         >>> import polypod as pp
         >>> mech = pp.load("lu-3spu-2rpu-r")
@@ -711,8 +717,8 @@ class Mechanism:
         found = self._core.assembly_modes(lengths)
         if found is None:
             raise UnsupportedError(
-                f"{self.name}: assembly modes need a design that is not singular everywhere and has at most one "
-                "idle freedom; forward_kinematics finds a pose near a guess"
+                f"{self.name}: assembly modes need a design that is not singular everywhere and has at most "
+                "one idle freedom; forward_kinematics finds a pose near a guess"
             )
         table, counts, status = found
         count = np.array(counts, dtype=np.int64)
@@ -863,9 +869,9 @@ class Mechanism:
             acceleration: (..., 6).
             wrench: load on the platform at o, (..., 6), N and N m; the mechanism's own by default.
             wrench_axes: the axes of `wrench`, "base" or "platform".
-            preferred: active forces (n,) or (..., n), N, that redundant actuators should have as nearly as the
-                balance lets them, such as a preload; those of passive legs are not read. The answer is the
-                nearest in the sense of least squares; without it the least one [T72]. Where forces are
+            preferred: active forces (n,) or (..., n), N, that redundant actuators should have as nearly as
+                the balance lets them, such as a preload; those of passive legs are not read. The answer is
+                the nearest in the sense of least squares; without it the least one [T72]. Where forces are
                 determined it has no effect.
 
         >>> import numpy as np, polypod as pp
@@ -877,10 +883,11 @@ class Mechanism:
         if preferred is None:
             args = MOTION.loaded(wrench, wrench_axes, pose, twist, acceleration)
             return InverseDynamics(self, **self._core.inverse_dynamics(*args))
-        *motion, near, load, axes = self._chosen.loaded(
+        poses, twists, accelerations, near, *load = self._chosen.loaded(
             wrench, wrench_axes, pose, twist, acceleration, preferred
         )
-        return InverseDynamics(self, **self._core.inverse_dynamics(*motion, load, axes, near))
+        out = self._core.inverse_dynamics(poses, twists, accelerations, load[0], load[1], near)
+        return InverseDynamics(self, **out)
 
     @cached_property
     def joint_list(self) -> tuple[Joint, ...]:

@@ -69,7 +69,7 @@ def legs_table(facts: Facts) -> Table:
 def mobility_table(facts: Facts) -> Table:
     """The terms of mobility."""
     mobility = facts["mobility"]
-    terms = (
+    terms: tuple[tuple[str, str, str], ...] = (
         ("freedoms of the platform", "dof", _idle(mobility["idle"])),
         ("links, with the base", "links", ""),
         ("joints", "joints", ""),
@@ -80,7 +80,10 @@ def mobility_table(facts: Facts) -> Table:
         ("passive freedoms", "passive", _of_legs("spin of", mobility["passive_legs"])),
     )
     if mobility["rows"] > 6:
-        terms = (*terms, ("rows of the Jacobian", "rows", "more actuators than it takes: forces are a choice"))
+        terms = (
+            *terms,
+            ("rows of the Jacobian", "rows", "more actuators than it takes: forces are a choice"),
+        )
     rows = [(term, str(mobility[key]), remark) for term, key, remark in terms]
     return Table("Mobility, from ranks at generic poses", ("", ">", ""), rows)
 

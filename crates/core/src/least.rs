@@ -4,7 +4,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use crate::constraint;
-use crate::forward::{FOLD_PIVOTS, Found, LONGEST_STEP, SMALL_STEP, are_coordinates, step_of};
+use crate::forward::{FOLD_PIVOTS, Found, LONGEST_STEP, are_coordinates, step_of};
 use crate::leg;
 use crate::mechanism::Mechanism;
 use crate::mobility::RANK_TOLERANCE;
@@ -23,7 +23,8 @@ const AGREEMENT: f64 = 1e-6;
 /// The same of a constraint.
 const KEPT: f64 = 1e-11;
 
-/// Steps below this size are made whatever they do: the iteration contracts there, to rounding if the legs agree.
+/// Steps below this size are made whatever they do: the iteration contracts there, to rounding if the legs agree, and if they
+/// do not to where they are missed least.
 const NEAR: f64 = 1e-6;
 
 /// Size of a step that is rounding.
@@ -119,7 +120,7 @@ pub fn forward_kinematics(mech: &Mechanism, lengths: &[f64], guess: &Pose<f64>) 
         match trial {
             Some(trial) if near || trial.square() <= at.square() - promised => {
                 // Rounding shrinks no further.
-                let done = near && trial.size >= 0.5 * at.size;
+                let done = near && trial.size >= 0.9 * at.size;
                 (pose, at, share) = (next, trial, (2.0 * share).min(1.0));
                 if done {
                     break;
@@ -132,7 +133,7 @@ pub fn forward_kinematics(mech: &Mechanism, lengths: &[f64], guess: &Pose<f64>) 
         }
     }
     let met = at.legs.amax() <= AGREEMENT && at.others.iter().all(|x| x.abs() <= KEPT);
-    let status = match (met, at.size <= SMALL_STEP) {
+    let status = match (met, at.size <= NEAR) {
         (true, _) if mech.mobility.uncontrolled > 0 || !(at.pivots > FOLD_PIVOTS) => Status::Singular,
         (true, _) => Status::Ok,
         (false, true) => Status::Inconsistent,

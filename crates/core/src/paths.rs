@@ -5,7 +5,7 @@ use crate::forward::{Asked, FOLD_PIVOTS, System, system};
 use crate::lanes::{self, Lanes, Row, Task, WIDTH};
 use crate::leg;
 use crate::linear::{Solved, solve, solve_all};
-use crate::mechanism::Mechanism;
+use crate::mechanism::{Mechanism, Side};
 use crate::real::{Ordered, Real};
 use crate::spatial::{Mat3, Pose, Vec3};
 
@@ -144,7 +144,7 @@ impl Path<'_> {
             {
                 if let Some((start, pose)) = waiting.next() {
                     *traveller = Some(Traveller::new(start));
-                    Place::of(pose).put(&mut place, k);
+                    Place::of(pose).unspun(self.mech).put(&mut place, k);
                 }
             }
             if travellers.iter().all(Option::is_none) {
@@ -184,6 +184,9 @@ impl Path<'_> {
                     copy(&next, &mut place, k);
                 }
                 let here = Place::get(&place, k);
+                if !self.mech.idle.is_empty() {
+                    here.unspun(self.mech).put(&mut place, k);
+                }
                 if !(here.size(self.mech) < INFINITE) {
                     (ends[who.start], *traveller) = (End::Infinite, None);
                 } else if who.t < 1.0 && who.h <= SMALLEST_STEP {
@@ -298,6 +301,28 @@ impl Place<C> {
             (0..4).fold(0, |a, b| if products[b][b].norm() > products[a][a].norm() { b } else { a });
         let share = one / products[largest][largest].sqrt();
         Place { q: products[largest].map(|p| p * share), o: pose.o }
+    }
+
+    /// The place after that imaginary idle spin which makes the quaternion least: spins are no part of a solution, and
+    /// imaginary ones let it grow without bounds \[T71\].
+    fn unspun(self, mech: &Mechanism) -> Self {
+        let [idle] = &mech.idle[..] else { return self };
+        let [w, x, y, z] = self.q;
+        let (u, v) = (Vec3::lift(idle.axis), Vec3::new(x, y, z));
+        // q u or u q: multiplied twice it is -q, so that q has two parts that it makes ±i times as large.
+        let across = if idle.side == Side::Platform { v.cross(u) } else { u.cross(v) };
+        let Vec3 { x, y, z } = u * w + across;
+        let (i, turned) = (C::new(0.0, 1.0), [-u.dot(v), x, y, z]);
+        let parts =
+            [-i, i].map(|i| std::array::from_fn::<C, 4, _>(|k| (self.q[k] + i * turned[k]).scale(0.5)));
+        let [a, b] = parts.map(|part| part.iter().map(|e| e.norm_sqr()).sum::<f64>().sqrt());
+        let share = (b / a).sqrt();
+        if !(share > 0.0 && share.is_finite()) {
+            return self;
+        }
+        let [first, second] = parts;
+        let q = std::array::from_fn(|k| first[k].scale(share) + second[k].scale(1.0 / share));
+        Place { q, ..self }
     }
 
     /// How large its coordinates are, as a pure number: of o, and of the rotation, by |q|²/|q·q|.

@@ -123,8 +123,8 @@ class Multibody:
     geometry: Mapping[str, Any]
     """The mechanism file's numbers in SI, as `Mechanism.geometry`."""
     idle: tuple[tuple[str, Array], ...] = ()
-    """Turns of the platform that no leg feels: the body that their line is fixed in, BASE or PLATFORM, and the
-    line's direction (3,) in its axes."""
+    """Turns of the platform that no leg feels: the body that their line is fixed in, BASE or PLATFORM, and
+    the line's direction (3,) in its axes."""
 
     @property
     def zero(self) -> Placements:

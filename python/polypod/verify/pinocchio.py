@@ -304,7 +304,13 @@ class Twin:
         tree.set(moved)
         found = self._kinematics(moved)
         forces, torques, freedoms, status = self._forces(moved, pose, twist, wrench)
-        found |= {"forces": forces, "idle_torques": torques, "freedoms": freedoms, "closure": moved.residual, "steps": moved.steps}
+        found |= {
+            "forces": forces,
+            "idle_torques": torques,
+            "freedoms": freedoms,
+            "closure": moved.residual,
+            "steps": moved.steps,
+        }
         if status is not Status.OK:
             return found, status
         free = self.free.move(self.free.start(tree.placements()), pose, twist, acceleration)
