@@ -75,7 +75,7 @@ fn leg_motion_is_the_derivative_of_leg_position() {
                 let p = leg::position(leg, &state.pose);
                 let f = leg::frame(leg, &state.pose, &p);
                 let m = leg::end(leg, &p, &f, &state);
-                let [_, r1, r2] = parts(jet.r);
+                let [_, r1, r2] = parts(leg::foot(leg, &jet) + jet.r);
                 let [_, d1, d2] = parts(jet.delta);
                 close(m.v_b, r1, EXACT, "v_b");
                 close(m.a_b, r2, EXACT, "a_b");
@@ -119,12 +119,14 @@ fn links_move_as_their_mass_centres_do() {
     for mech in mechanisms() {
         for state in samples(&mech) {
             let moving = moving(&state);
-            for leg in mech.legs.iter().filter(|l| l.letters() != "SPS") {
+            for leg in mech.legs.iter().filter(|l| !["SPS", "PSS"].contains(&l.letters().as_str())) {
                 let pj = leg::position(leg, &moving);
                 let fj = leg::frame(leg, &moving, &pj);
                 let whole = leg::state(leg, &state);
-                let piston = parts(pj.r + fj.axes * Vec3::lift(leg.piston.center));
-                let cylinder = parts(fj.axes * Vec3::lift(leg.cylinder.center));
+                let foot = leg::foot(leg, &pj);
+                let axes = if leg.links()[0] == "carriage" { Mat3::identity() } else { fj.axes };
+                let piston = parts(foot + pj.r + fj.axes * Vec3::lift(leg.piston.center));
+                let cylinder = parts(foot + axes * Vec3::lift(leg.cylinder.center));
                 for (found, exact) in
                     [(leg::piston(leg, &whole), piston), (leg::cylinder(leg, &whole), cylinder)]
                 {

@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::{mechanisms, moving, on_rod, published, states, with_leg};
+use common::{mechanisms, moving, published, states};
 use std::sync::Arc;
 
 use polypod_core::batch::{self, Loads, States};

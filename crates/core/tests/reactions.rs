@@ -51,15 +51,17 @@ fn links(mech: &Mechanism, state: &Motion<f64>) -> Vec<(String, Link)> {
     for leg in &mech.legs {
         let p = leg::position(leg, &pose);
         let mut axes = leg::frame(leg, &pose, &p).axes;
-        if leg.letters() == "SPS" {
+        if ["SPS", "PSS"].contains(&leg.letters().as_str()) {
             // It does not spin, and its bodies are symmetric: any axes that turn with δ will do.
             axes = without_spin(axes, parts(p.delta));
         }
-        let base = Vec3::lift(leg.base.point);
-        let cylinder = by_momentum(&leg.cylinder, axes, base, mech.gravity);
-        let piston = by_momentum(&leg.piston, axes, base + p.r, mech.gravity);
-        all.push((format!("cylinder {}", leg.name), cylinder));
-        all.push((format!("piston {}", leg.name), piston));
+        let (foot, [first, second]) = (leg::foot(leg, &p), leg.links());
+        // A carriage keeps the base's axes.
+        let below = if first == "carriage" { Mat3::identity() } else { axes };
+        let lower = by_momentum(&leg.cylinder, below, foot, mech.gravity);
+        let upper = by_momentum(&leg.piston, axes, foot + p.r, mech.gravity);
+        all.push((format!("{first} {}", leg.name), lower));
+        all.push((format!("{second} {}", leg.name), upper));
     }
     for rod in &mech.rods {
         let leader = &mech.legs[rod.leader];
@@ -244,7 +246,7 @@ fn the_constraint_wrench_is_what_others_leave() {
                 let k = mech.rods.len() + 3 * i + 2;
                 rest = rest
                     + if constrains {
-                        leg::row(&leg::position(leg, &state.pose)) * force
+                        leg::row(leg, &leg::position(leg, &state.pose)) * force
                     } else {
                         found.least[k].moved(found.places[k].point - state.pose.o)
                     };

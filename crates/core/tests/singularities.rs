@@ -57,7 +57,7 @@ fn the_rate_of_the_determinant_is_its_derivative() {
 
 /// What the legs and all constraints of a mechanism say of a twist, with the size of what they could say.
 fn noticed(mech: &Mechanism, pose: &Pose<f64>, twist: &Twist<f64>) -> [f64; 2] {
-    let legs = mech.actuated().map(|(_, leg)| leg::row(&leg::position(leg, pose)).power(twist));
+    let legs = mech.actuated().map(|(_, leg)| leg::row(leg, &leg::position(leg, pose)).power(twist));
     let rows = mech.constraints.iter().map(|c| constraint::row(c, pose).power(twist));
     let norm = |values: &mut dyn Iterator<Item = f64>| values.map(|x| x * x).sum::<f64>().sqrt();
     [norm(&mut legs.into_iter()), norm(&mut rows.into_iter())]

@@ -142,14 +142,17 @@ fn generic(name: &str, letters: &[String], on_rod: usize, actuated: usize, seed:
         let delta = (home.0 + rotation * above - below).unit();
         let n = if stands_on_rod { line.cross(delta).unit() } else { delta.cross(draw.vector()).unit() };
         let symmetric = base == "S" && platform == "S";
-        let tilts = [0.5 * draw.number(), 0.5 * draw.number()];
+        let mut tilts = [0.5 * draw.number(), 0.5 * draw.number()];
+        if joints == "PUU" {
+            tilts[0] = 0.9; // its axis is the rail, which must be far from square to the strut
+        }
         let slider = joints.starts_with('P').then(|| {
-            // The strut is long enough to be where it is, the carriage somewhere on the rail.
+            // The rail is far from square to the strut, the carriage somewhere on it.
             let side = n.cross(delta);
             let axis = match (base, platform) {
                 ("R", _) => delta + side * 0.7,
                 ("U", "U") => delta * tilts[0].sin() + side * tilts[0].cos(),
-                _ => draw.vector(),
+                _ => delta * tilts[1].signum() + draw.vector() * 0.5,
             };
             let strut = (home.0 + rotation * above - below).norm();
             let branch = axis.dot(delta).signum();
