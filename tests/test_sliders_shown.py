@@ -197,3 +197,8 @@ def test_the_workspace_of_a_slider_is_bounded_by_its_rail():
     assert found.volume > 0.0
     inside = found.vertices
     assert np.all((inside > box[:, 0] - 0.15) & (inside < box[:, 1] + 0.15))
+
+
+def test_a_lattice_of_lengths_is_of_telescopic_legs():
+    with pytest.raises(pp.UnsupportedError, match="legs 1, 2, 3 are sliders"):
+        pp.load("3-prs").length_lattice(step=0.04)
