@@ -202,3 +202,19 @@ def test_the_workspace_of_a_slider_is_bounded_by_its_rail():
 def test_a_lattice_of_lengths_is_of_telescopic_legs():
     with pytest.raises(pp.UnsupportedError, match="legs 1, 2, 3 are sliders"):
         pp.load("3-prs").length_lattice(step=0.04)
+
+
+def test_datasets_say_what_they_hold():
+    """In whatever file they go: places, struts and carriages."""
+    for name, said in (("prs", "place of the carriage"), ("mixed", "leg length, or place of the carriage")):
+        mech = sliders.mechanism(name)
+        assert mech.inverse_kinematics(mech.home).to_xarray().lengths.attrs["long_name"] == said
+    mech = sliders.mechanism("prs")
+    time = np.linspace(0.0, 1.0, 3)
+    motion = pp.Motion.through(time, {"z": 0.65 + 0 * time, "rx": 0 * time, "ry": 0 * time}, set="pose")
+    data = pp.solve(mech, motion).dataset
+    assert data.length.attrs["symbol"] == "q"
+    assert data.piston_velocity.attrs["long_name"] == "velocity of the strut's mass centre"
+    assert data.force.attrs["long_name"] == "active force along the rail"
+    hexapod = pp.load("ups-hexapod")
+    assert hexapod.inverse_kinematics(hexapod.home).to_xarray().lengths.attrs["long_name"] == "leg length"
