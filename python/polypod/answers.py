@@ -76,9 +76,9 @@ class InverseKinematics(Answer):
     """Legs at a pose [Eq. 3]."""
 
     lengths: Array
-    """(..., n), m."""
+    """(..., n), m; of a slider the place q of its carriage on the rail [T67]."""
     vectors: Array
-    """(..., n, 3): r from B to b, m."""
+    """(..., n, 3): r from B to b, m; of a slider from the strut's foot."""
     directions: Array
     """(..., n, 3): δ, unit vectors along r."""
     status: Codes
@@ -155,11 +155,11 @@ class Kinematics(Answer):
     """Motion of legs, rods, links and joints [Eq. 2-39], base axes, SI."""
 
     lengths: Array
-    """(..., n): ℓ, m [Eq. 3]."""
+    """(..., n): ℓ, m [Eq. 3]; of a slider the place q of its carriage on the rail [T67]."""
     rates: Array
-    """(..., n): ℓ', m/s [Eq. 6]."""
+    """(..., n): ℓ', m/s [Eq. 6], or q' [T68]."""
     accelerations: Array
-    """(..., n): ℓ'', m/s^2 [Eq. 15]."""
+    """(..., n): ℓ'', m/s^2 [Eq. 15], or q'' [T68]."""
     directions: Array
     """(..., n, 3): δ, unit vectors along the legs."""
     leg_omega: Array
@@ -171,13 +171,13 @@ class Kinematics(Answer):
     leg_spin_rate: Array
     """(..., n): its rate, rad/s^2."""
     piston_velocity: Array
-    """(..., n, 3): of the piston's mass centre, m/s [Eq. 38]."""
+    """(..., n, 3): of the piston's or strut's mass centre, m/s [Eq. 38]."""
     piston_acceleration: Array
-    """(..., n, 3): of the piston's mass centre, m/s^2 [Eq. 39]."""
+    """(..., n, 3): of the piston's or strut's mass centre, m/s^2 [Eq. 39]."""
     cylinder_velocity: Array
-    """(..., n, 3): of the cylinder's mass centre, m/s [Eq. 38]."""
+    """(..., n, 3): of the cylinder's or carriage's mass centre, m/s [Eq. 38]."""
     cylinder_acceleration: Array
-    """(..., n, 3): of the cylinder's mass centre, m/s^2 [Eq. 39]."""
+    """(..., n, 3): of the cylinder's or carriage's mass centre, m/s^2 [Eq. 39]."""
     base_joint_angles: Array
     """(..., n, 2): leg against base, zero at home, rad: about the axis in the base, then n; or NaN."""
     base_joint_rates: Array
@@ -254,7 +254,10 @@ class InverseDynamics(Answer):
     """What balances a motion [Eq. 43]."""
 
     forces: Array
-    """(..., n): active forces, N, positive when they push the platform away; zero for passive legs."""
+    """(..., n): active forces, N; zero for passive legs.
+
+    Positive when they push the platform away; of a slider when they push the carriage along its rail's axis.
+    """
     constraint: Array
     """(..., k): multipliers of the independent constraints, N, of kind D N m; for the paper's machine f_c."""
     idle_torques: Array
@@ -394,7 +397,10 @@ class JointReactions(Answer):
     joints: tuple[Joint, ...]
     """The j joints, as in `Mechanism.joint_list`."""
     points: Array
-    """(..., j, 3): the joints' points in base axes, m: B, and b for prismatic and platform joints."""
+    """(..., j, 3): the joints' points in base axes, m: B, and b for prismatic and platform joints.
+
+    Of a slider the strut's foot for base and prismatic joint.
+    """
     axes: Array
     """(..., j, 3, 3): joint axes to base axes, the axes as columns."""
     reactions: Array
@@ -545,7 +551,7 @@ class GraphLink:
     """A link of the topology graph."""
 
     name: str
-    """Such as "cylinder 1", "rod L" or "platform"."""
+    """Such as "cylinder 1", "carriage 2", "rod L" or "platform"."""
     joints: tuple[int, ...]
     """Indices of its joints in `Mobility.graph_joints`."""
 

@@ -248,7 +248,9 @@ class _Shapes:
         ]
         ends = np.array([end for _, end in feet]).reshape(-1, 3)
         # Below the platform, too, where that hangs between the rails.
-        over = np.maximum(ends @ up - self._lowest + 5.0 * thick, 0.0) if self._standing else np.zeros(len(ends))
+        over = (
+            np.maximum(ends @ up - self._lowest + 5.0 * thick, 0.0) if self._standing else np.zeros(len(ends))
+        )
         pieces = self._body("base", self._base, up, BASE, ends - over[:, None] * up)
         low = float(np.min(pieces[0].mesh.vertices @ up)) + 0.1 * thick
         for name, end in feet:

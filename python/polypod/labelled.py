@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from polypod.errors import ShapeError
 from polypod.notebook import Rows, card, counted, numbers, outcomes, rows_of
 from polypod.status import Status
-from polypod.variables import DIMENSIONS, HALVES, POSE, Variable, coords_of, variable
+from polypod.variables import DIMENSIONS, HALVES, POSE, Variable, attributes_of, coords_of, variable
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -135,7 +135,7 @@ class Answer:
             of = about.dims if quantity.name in self._same_for_all else (*leading, *about.dims)
             # A variable may not have the name of a dimension.
             name = quantity.key if quantity.name in DIMENSIONS else quantity.name
-            data[name] = (of, values, about.attributes)
+            data[name] = (of, values, attributes_of(quantity.key, about, self.mech.sliders))
             dims |= {*of}
         coords = coords_of(self.mech, dims, self.labels())
         title, _ = self._heading()

@@ -119,6 +119,10 @@ def length_lattice(
     """The positions of o over a lattice of leg lengths; see `Mechanism.length_lattice`."""
     mech = with_floor(mech, sigma_min)
     check_threads(threads)
+    driven = mech.sliders & mech.actuated
+    if driven.any():
+        sliding = ", ".join(np.array(mech.leg_names)[driven])
+        raise UnsupportedError(f"legs {sliding} are sliders; a lattice of lengths is of telescopic legs")
     strokes = mech.stroke[mech.actuated]
     widths = np.ptp(strokes, axis=1)
     for name, (least, greatest) in zip(np.array(mech.leg_names)[mech.actuated], strokes, strict=True):

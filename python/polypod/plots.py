@@ -213,6 +213,7 @@ def fig4_panels(data: xr.Dataset) -> list[Panel]:
         return Panel(label, unit, values, curves, stroke_of(data) if name == "length" else ())
 
     position = 1e3 * data["pose"].to_numpy()[:, :3, 3]
+    length, rate, gain = _symbols(data)
     forces = of_legs("force", "active force $f_a$", "f_{a#}", "N")
     panels = [
         Panel("position of $o$", "mm", position, ("$X_o$", "$Y_o$", "$Z_o$")),
@@ -221,9 +222,9 @@ def fig4_panels(data: xr.Dataset) -> list[Panel]:
         six("twist", 1, r"angular velocity $\omega$", r"\omega", "rad s$^{-1}$"),
         six("acceleration", 1, r"angular acceleration $\varepsilon$", r"\varepsilon", "rad s$^{-2}$"),
         _orientation(data),
-        of_legs("length", *_symbols(data), "mm", 1e3),
-        of_legs("rate", "leg rate $v_r$", "v_{r#}", "mm s$^{-1}$", 1e3),
-        of_legs("leg_acceleration", "leg acceleration $a_r$", "a_{r#}", "mm s$^{-2}$", 1e3),
+        of_legs("length", *length, "mm", 1e3),
+        of_legs("rate", *rate, "mm s$^{-1}$", 1e3),
+        of_legs("leg_acceleration", *gain, "mm s$^{-2}$", 1e3),
         in_kilo(forces),
         _second_forces(data),
         _torque(data),
@@ -231,10 +232,20 @@ def fig4_panels(data: xr.Dataset) -> list[Panel]:
     return [panel for panel in panels if panel is not None]
 
 
-def _symbols(data: xr.Dataset) -> tuple[str, str]:
-    """Label and symbol of what the prismatic joints have."""
+def _symbols(data: xr.Dataset) -> tuple[tuple[str, str], tuple[str, str], tuple[str, str]]:
+    """Label and symbol of what the prismatic joints have, of its rate and of its second rate."""
     word = word_of(data)
-    return ("leg length $r$", "r_{#}") if word == "length" else (f"{word} $q$", "q_{#}")
+    if word == "length":
+        return (
+            ("leg length $r$", "r_{#}"),
+            ("leg rate $v_r$", "v_{r#}"),
+            ("leg acceleration $a_r$", "a_{r#}"),
+        )
+    return (
+        (f"{word} $q$", "q_{#}"),
+        ("its rate $q'$", "q'_{#}"),
+        ("its second rate $q''$", "q''_{#}"),
+    )
 
 
 def _orientation(data: xr.Dataset) -> Panel | None:
@@ -319,11 +330,19 @@ def _topology_places(mobility: Mobility) -> tuple[dict[int, tuple[float, float, 
 
     Every leg has one prismatic joint and is a column; legs on one rod stand side by side.
     """
-    sliders = [joint.links for joint in mobility.graph_joints if joint.kind == "P"]
     neighbours: defaultdict[int, set[int]] = defaultdict(set)
     for joint in mobility.graph_joints:
         for a, b in (joint.links, joint.links[::-1]):
             neighbours[a].add(b)
+
+    def links_of(slide: tuple[int, int]) -> tuple[int, int]:
+        """Cylinder and piston, or carriage and strut: the carriage slides on the base."""
+        carriage = slide[1]
+        if not mobility.graph_links[carriage].name.startswith("carriage "):
+            return slide
+        return carriage, next(link for link in neighbours[carriage] if link not in _HUBS)
+
+    sliders = [links_of(joint.links) for joint in mobility.graph_joints if joint.kind == "P"]
     ends = {end for slider in sliders for end in slider} | {*_HUBS}
     rods = [i for i in range(mobility.links) if i not in ends]
 

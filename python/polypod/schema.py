@@ -486,7 +486,7 @@ _FORM_OF_KEY = {
     "point": "[x, y, z] or { radius, angle, z }",
     "axis": "[x, y, z] or { angle, z }",
     "normal": "[x, y, z] or { angle, z }",
-    "center": "[x, y, z] (a distance will do in cylinder and piston)",
+    "center": "[x, y, z] (a distance will do in cylinder, piston and strut)",
     "inertia": "a number, [Ixx, Iyy, Izz] or three rows of three",
 }
 _NEEDED = {

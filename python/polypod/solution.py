@@ -20,7 +20,7 @@ from polypod.passages import find_passages
 from polypod.results import Solution
 from polypod.singularity import Determinant
 from polypod.status import Status
-from polypod.variables import TIME, coords_of, variable
+from polypod.variables import TIME, attributes_of, coords_of, variable
 from polypod.variables import VARIABLES as VARIABLES
 
 CHUNK = 20_000
@@ -171,7 +171,7 @@ def dataset_of(
         about = variable(name)
         # A mechanism without rods or constraints has no such variables.
         if 0 not in array.shape[1:]:
-            data[name] = (("time", *about.dims), array, about.attributes)
+            data[name] = (("time", *about.dims), array, attributes_of(name, about, mech.sliders))
     dims = {dim for of, _, _ in data.values() for dim in of}
     instants = {"time": ("time", time, TIME)}
     source = {

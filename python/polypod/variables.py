@@ -14,6 +14,9 @@ from polypod.status import Status
 from polypod.units import coordinate_unit
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
     from polypod.mechanism import Mechanism
 
 Dims = tuple[str, ...]
@@ -241,6 +244,30 @@ def variable(name: str) -> Variable:
     base = name.removeprefix(prefix)
     symbol = _SYMBOLS.get(base, base) + primes
     return Variable(_ONE, coordinate_unit(base) + per, symbol, f"{before}coordinate {base}")
+
+
+_OF_SLIDERS = {
+    "length": ("q", "place of the carriage"),
+    "rate": ("q'", "rate of the carriage's place"),
+    "leg_acceleration": ("q''", "second rate of the carriage's place"),
+    "piston_velocity": ("v_p", "velocity of the strut's mass centre"),
+    "piston_acceleration": ("a_p", "acceleration of the strut's mass centre"),
+    "cylinder_velocity": ("v_q", "velocity of the carriage's mass centre"),
+    "cylinder_acceleration": ("a_q", "acceleration of the carriage's mass centre"),
+    "force": ("f_a", "active force along the rail"),
+}
+"""Symbol and long name of what is called otherwise where a leg slides on a rail."""
+
+
+def attributes_of(name: str, about: Variable, sliders: NDArray[np.bool_]) -> dict[str, Any]:
+    """Those of a variable of a dataset of a mechanism, with `sliders` (n,) among its legs."""
+    found, sliding = about.attributes, _OF_SLIDERS.get(name)
+    if sliding is None or not sliders.any():
+        return found
+    symbol, long_name = sliding
+    if not sliders.all():
+        long_name = f"{about.long_name}, or {long_name}"
+    return found | {"symbol": symbol, "long_name": long_name}
 
 
 # --- labels along dimensions --------------------------------------------------------------------------------

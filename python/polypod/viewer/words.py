@@ -8,6 +8,7 @@ from typing import Any
 
 from jinja2 import Environment, PackageLoader
 
+from polypod.drives import word
 from polypod.mechanism import Mechanism
 from polypod.style import GREY, color_of
 from polypod.units import coordinate_unit
@@ -65,6 +66,7 @@ def numbers(
         view=view,
         place=[_cell(name, value) for name, value in place.items()],
         legs=[_leg(view, mech, i) for i in range(mech.n_legs)],
+        what=word(mech.leg_letters),
         screw=_screw(view.screw),
         ranges=[_range(name, *pair) for name, pair in ranges.items()],
         largest=f"{largest:.0f} N" if largest >= 10.0 else f"{largest:.3g} N" if largest > 0.0 else "",
