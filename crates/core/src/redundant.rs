@@ -87,11 +87,11 @@ impl Parted {
         let n = mech.actuated().count();
         let idle = mech.idle.iter().map(|_| scale);
         let units = idle.chain(mech.independent.iter().map(|c| constraint::length(c, scale))).collect();
-        Self::of(rows, n, units, scale)
+        Self::of(&rows, n, units, scale)
     }
 
     /// The same of the given rows, the first `n` of them those of legs.
-    fn of(rows: Vec<[f64; 6]>, n: usize, units: Vec<f64>, scale: f64) -> Option<Self> {
+    fn of(rows: &[[f64; 6]], n: usize, units: Vec<f64>, scale: f64) -> Option<Self> {
         let held = rows.len() - n;
         let legs = DMatrix::from_fn(n, 6, |i, j| rows[i][j]);
         let rest = DMatrix::from_fn(held, 6, |i, j| rows[n + i][j]);
@@ -183,14 +183,12 @@ pub fn inverse_dynamics(
     let parted = Parted::at(mech, &platform.pose).filter(|parted| parted.regular);
     let solved = parted.map(|parted| parted.solve(preferred, resultant(mech, platform, load) * -1.0, &[]));
     let finite = |x: &Balanced| x.forces.iter().chain(&x.multipliers).all(|x| x.is_finite());
-    match solved.filter(finite) {
-        Some(Balanced { forces, multipliers, .. }) => Forces { forces, multipliers, regular: true },
-        None => {
-            let n = mech.actuated().count();
-            let (forces, multipliers) = (vec![f64::NAN; n], vec![f64::NAN; mech.rows() - n]);
-            Forces { forces, multipliers, regular: false }
-        }
+    if let Some(Balanced { forces, multipliers, .. }) = solved.filter(finite) {
+        return Forces { forces, multipliers, regular: true };
     }
+    let n = mech.actuated().count();
+    let (forces, multipliers) = (vec![f64::NAN; n], vec![f64::NAN; mech.rows() - n]);
+    Forces { forces, multipliers, regular: false }
 }
 
 /// A motion from what legs do, as far as they agree.
@@ -427,7 +425,7 @@ mod tests {
         let mut rows: Vec<[f64; 6]> = vec![unit(1), unit(1), unit(2), unit(3), unit(4), unit(5)];
         (rows[0][0], rows[1][0]) = (tiny, -tiny);
         rows.push([0.0, 0.0, 0.6, 0.8, 0.0, 0.0]);
-        let parted = Parted::of(rows, 7, vec![], 1.0).expect("finite");
+        let parted = Parted::of(&rows, 7, vec![], 1.0).expect("finite");
         assert!(parted.regular);
         let found = parted.answer(Wrench::from_array([-1e-3, 0.0, 0.0, 0.0, 0.0, 0.0]));
         let expected = [1e-3 / (2.0 * tiny), -1e-3 / (2.0 * tiny)];
