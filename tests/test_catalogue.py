@@ -161,7 +161,7 @@ def test_mobility_is_that_of_the_literature(name: str) -> None:
     assert len(mobility.idle) == (name in IDLE)
     assert mech.actuated.sum() == mech.dof - (name in IDLE) + (name in REDUNDANT)
     assert mech.n_rows == 6 + (name in REDUNDANT)
-    assert mobility.passive == sum(letters == "SPS" for letters in mech.leg_letters)
+    assert mobility.passive == sum(letters in ("SPS", "PSS") for letters in mech.leg_letters)
     assert mobility.passive == sum(letters in ("SPS", "PSS") for letters in mech.leg_letters)
     # Kutzbach: 6 (n - k - 1) + ΣM_i + ς - M_0
     terms = 6 * (mobility.links - mobility.joints - 1) + mobility.joint_freedoms

@@ -133,8 +133,8 @@ def length_lattice(
     if int(mech.actuated.sum()) != mech.dof:
         raise UnsupportedError(
             f"{mech.name}: a lattice of lengths needs as many actuated legs as freedoms: lengths of "
-            "redundant legs contradict one another at most nodes, and with an idle freedom poses differ by a spin that "
-            "lengths do not tell; workspace works with poses"
+            "redundant legs contradict one another at most nodes, and with an idle freedom poses differ by a "
+            "spin that lengths do not tell; workspace works with poses"
         )
     step = float(widths.min() / DIVISIONS) if step is None else step
     layer = step if layer is None else layer

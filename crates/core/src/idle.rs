@@ -230,3 +230,51 @@ fn is_new(mech: &Mechanism, found: &[Idle], idle: &Idle, pose: &Pose<f64>) -> bo
     let svd = Svd::of(&DMatrix::from_fn(6, rows.len(), |i, j| rows[j][i]));
     svd.is_some_and(|svd| svd.rank(FIXED) == rows.len())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::common::{mechanisms, pentapod, states};
+
+    #[test]
+    fn the_line_of_the_joints_is_found_and_no_leg_feels_it() {
+        for (body, side) in [("platform", Side::Platform), ("base", Side::Base)] {
+            for seed in 1..6 {
+                let mech = pentapod(5, body, seed);
+                let [idle] = &mech.idle[..] else { panic!("{} idle freedoms", mech.idle.len()) };
+                assert_eq!((idle.side, mech.mobility.uncontrolled, mech.rows()), (side, 0, 6));
+                for leg in &mech.legs {
+                    assert!(idle.axis.cross(end(leg, side) - idle.point).norm() < 1e-12);
+                }
+                for state in states(&mech, 4, 2) {
+                    let spin = twist(idle, &state.pose);
+                    for leg in &mech.legs {
+                        let rate = leg::row(&leg::position(leg, &state.pose)).power(&spin);
+                        assert!(rate.abs() < 1e-14, "{rate}");
+                    }
+                    assert!((row(idle, &state.pose).power(&spin) - 1.0).abs() < 1e-14);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn generic_mechanisms_have_none() {
+        for mech in mechanisms() {
+            assert!(mech.idle.is_empty(), "{}", mech.name);
+        }
+    }
+
+    #[test]
+    fn screws_and_translations_are_none() {
+        let turn = |v: Vec3<f64>, omega: Vec3<f64>| Twist::new(v, omega);
+        assert_eq!(turns(&[turn(Vec3::X, Vec3::Z)]).len(), 1);
+        assert!(turns(&[turn(Vec3::Z * 0.1, Vec3::Z)]).is_empty(), "a pitch");
+        assert!(turns(&[turn(Vec3::X, Vec3::zero())]).is_empty(), "a translation");
+        assert!(
+            turns(&[turn(Vec3::X, Vec3::Z), turn(Vec3::zero(), Vec3::X)]).is_empty(),
+            "lines that do not meet"
+        );
+        assert_eq!(turns(&[turn(Vec3::X, Vec3::Z), turn(Vec3::zero(), Vec3::Y)]).len(), 2);
+    }
+}

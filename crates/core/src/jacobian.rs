@@ -28,7 +28,6 @@ pub fn jacobian<T: Real>(mech: &Mechanism<impl Constant<T>>, pose: &Pose<T>) -> 
 }
 
 /// Rows of idle freedoms, then those of constraints.
-
 #[inline(always)]
 pub(crate) fn other_rows<T: Real>(mech: &Mechanism<impl Constant<T>>, pose: &Pose<T>, rows: &mut [[T; 6]]) {
     let idle = mech.idle.len();

@@ -46,7 +46,7 @@ struct Misses {
     /// (v/Λ, ω), and its size.
     step: [f64; 6],
     size: f64,
-    /// What is left of the square of all that is missed, if rows stay as they are.
+    /// What is left of the square of what lengths miss, if rows stay as they are.
     left: f64,
     /// Least to greatest singular value of the legs' rows on what the others allow.
     pivots: f64,
@@ -78,8 +78,10 @@ impl Misses {
         size.is_finite().then_some(Misses { legs, others, step, size, left, pivots })
     }
 
-    fn square(&self) -> f64 {
-        self.legs.norm_squared() + self.others.norm_squared()
+    /// What must fall: the square of what lengths miss, and what constraints miss, not squared, so that they are kept at the
+    /// cost of lengths that contradict one another.
+    fn merit(&self) -> f64 {
+        self.legs.norm_squared() + self.others.iter().map(|x| x.abs()).sum::<f64>()
     }
 }
 
@@ -116,9 +118,9 @@ pub fn forward_kinematics(mech: &Mechanism, lengths: &[f64], guess: &Pose<f64>) 
         let next = pose.stepped(&step_of(mech, at.step, share));
         let trial = Misses::at(mech, lengths, &next);
         let near = at.size <= NEAR;
-        let promised = 0.1 * share * (at.square() - at.left).max(0.0);
+        let promised = 0.1 * share * (at.merit() - at.left).max(0.0);
         match trial {
-            Some(trial) if near || trial.square() <= at.square() - promised => {
+            Some(trial) if near || trial.merit() <= at.merit() - promised => {
                 // Rounding shrinks no further.
                 let done = near && trial.size >= 0.9 * at.size;
                 (pose, at, share) = (next, trial, (2.0 * share).min(1.0));
@@ -152,4 +154,30 @@ pub fn error(mech: &Mechanism, lengths: &[f64], pose: &Pose<f64>) -> f64 {
         .zip(lengths)
         .map(|((_, leg), asked)| (leg::position(leg, pose).coordinate - asked).abs());
     legs.fold(constraint::largest_distance(mech, pose), |m, e| if e > m || e.is_nan() { e } else { m })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::common::{pentapod, redundant, states};
+
+    #[test]
+    fn a_pose_has_all_lengths_or_none_is_told() {
+        for mech in [redundant(1), redundant(2), pentapod(6, "platform", 3)] {
+            for state in states(&mech, 5, 4) {
+                let mut lengths: Vec<f64> =
+                    mech.actuated().map(|(_, leg)| leg::position(leg, &state.pose).length).collect();
+                let found = forward_kinematics(&mech, &lengths, &mech.home);
+                assert_eq!(found.status, Status::Ok, "{}", mech.name);
+                assert!(found.residual < 1e-12);
+                lengths[0] += 0.02 * mech.characteristic_length;
+                let found = forward_kinematics(&mech, &lengths, &state.pose);
+                assert_eq!(found.status, Status::Inconsistent, "{}", mech.name);
+                // Constraints are kept whatever the lengths say.
+                assert!(constraint::largest_distance(&mech, &found.pose) < 1e-9);
+                lengths[1] = f64::NAN;
+                assert_eq!(forward_kinematics(&mech, &lengths, &mech.home).status, Status::InvalidInput);
+            }
+        }
+    }
 }

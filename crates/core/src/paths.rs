@@ -322,7 +322,14 @@ impl Place<C> {
         }
         let [first, second] = parts;
         let q = std::array::from_fn(|k| first[k].scale(share) + second[k].scale(1.0 / share));
-        Place { q, ..self }
+        // The line stays where it is: o turns about it.
+        let (before, after) = (self.pose(), Place { q, ..self }.pose());
+        let point = Vec3::lift(idle.point);
+        let o = match idle.side {
+            Side::Platform => self.o + before.rotation * point - after.rotation * point,
+            Side::Base => point - after.rotation * before.rotation.transpose_mul(point - self.o),
+        };
+        Place { q, o }
     }
 
     /// How large its coordinates are, as a pure number: of o, and of the rotation, by |q|²/|q·q|.

@@ -87,11 +87,11 @@ impl Parted {
         let n = mech.actuated().count();
         let idle = mech.idle.iter().map(|_| scale);
         let units = idle.chain(mech.independent.iter().map(|c| constraint::length(c, scale))).collect();
-        Self::of(rows, n, units, scale)
+        Self::of(&rows, n, units, scale)
     }
 
     /// The same of the given rows, the first `n` of them those of legs.
-    fn of(rows: Vec<[f64; 6]>, n: usize, units: Vec<f64>, scale: f64) -> Option<Self> {
+    fn of(rows: &[[f64; 6]], n: usize, units: Vec<f64>, scale: f64) -> Option<Self> {
         let held = rows.len() - n;
         let legs = DMatrix::from_fn(n, 6, |i, j| rows[i][j]);
         let rest = DMatrix::from_fn(held, 6, |i, j| rows[n + i][j]);
@@ -183,14 +183,12 @@ pub fn inverse_dynamics(
     let parted = Parted::at(mech, &platform.pose).filter(|parted| parted.regular);
     let solved = parted.map(|parted| parted.solve(preferred, resultant(mech, platform, load) * -1.0, &[]));
     let finite = |x: &Balanced| x.forces.iter().chain(&x.multipliers).all(|x| x.is_finite());
-    match solved.filter(finite) {
-        Some(Balanced { forces, multipliers, .. }) => Forces { forces, multipliers, regular: true },
-        None => {
-            let n = mech.actuated().count();
-            let (forces, multipliers) = (vec![f64::NAN; n], vec![f64::NAN; mech.rows() - n]);
-            Forces { forces, multipliers, regular: false }
-        }
+    if let Some(Balanced { forces, multipliers, .. }) = solved.filter(finite) {
+        return Forces { forces, multipliers, regular: true };
     }
+    let n = mech.actuated().count();
+    let (forces, multipliers) = (vec![f64::NAN; n], vec![f64::NAN; mech.rows() - n]);
+    Forces { forces, multipliers, regular: false }
 }
 
 /// A motion from what legs do, as far as they agree.
@@ -371,5 +369,97 @@ pub(crate) fn combined(by_motion: &[Column], step: &[f64; DIRECTIONS]) -> Column
 fn add(sum: &mut [f64], other: &[f64]) {
     for (a, b) in sum.iter_mut().zip(other) {
         *a += b;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::common::{Draw, pentapod, redundant, states};
+
+    fn mechanisms() -> Vec<Mechanism> {
+        vec![redundant(1), redundant(2), pentapod(6, "platform", 3), pentapod(7, "base", 4)]
+    }
+
+    /// What the three parts of the balance are off by, in pure numbers.
+    fn missed(parted: &Parted, near: &[f64], w: Wrench<f64>, rates: &[f64], found: &Balanced) -> f64 {
+        let y = DVector::from_column_slice(
+            &Twist::new(found.motion.v, found.motion.omega * parted.scale).array(),
+        );
+        let f = DVector::from_column_slice(&found.forces);
+        let w = Wrench::new(w.force, w.torque * (1.0 / parted.scale)).array();
+        let units = DVector::from_column_slice(&parted.units);
+        let multipliers = DVector::from_column_slice(&found.multipliers).component_div(&units);
+        let first = &f - &parted.legs * &y - DVector::from_column_slice(near);
+        let second = parted.legs.transpose() * &f + parted.rest.transpose() * multipliers
+            - DVector::from_column_slice(&w);
+        let third = &parted.rest * &y - DVector::from_column_slice(rates).component_mul(&units);
+        let [first, second, third] =
+            [first, second, third].map(|part| part.iter().fold(0.0, |m: f64, x| m.max(x.abs())));
+        first.max(second).max(third)
+    }
+
+    #[test]
+    fn all_parts_of_the_balance_hold() {
+        let mut draw = Draw::new(7);
+        for mech in mechanisms() {
+            assert!(mech.is_redundant() && mech.mobility.uncontrolled == 0, "{}", mech.name);
+            for state in states(&mech, 5, 3) {
+                let parted = Parted::at(&mech, &state.pose).expect("legs have directions");
+                let mut numbers = |count: usize| (0..count).map(|_| draw.number()).collect::<Vec<f64>>();
+                let near = numbers(mech.actuated().count());
+                let rates = numbers(mech.rows() - near.len());
+                let w = Wrench::from_array(numbers(6).try_into().expect("six"));
+                let found = parted.solve(&near, w, &rates);
+                let size = found.motion.v.norm() + found.forces.iter().fold(1.0, |m: f64, f| m.max(f.abs()));
+                assert!(missed(&parted, &near, w, &rates, &found) < 1e-12 * size, "{}", mech.name);
+            }
+        }
+    }
+
+    #[test]
+    fn condition_numbers_are_not_squared() {
+        // Two legs nearly in one line hold the first direction by a ten-millionth: products of rows would know nothing of it.
+        let tiny = 1e-9;
+        let unit = |i: usize| std::array::from_fn(|j| f64::from(u8::from(i == j)));
+        let mut rows: Vec<[f64; 6]> = vec![unit(1), unit(1), unit(2), unit(3), unit(4), unit(5)];
+        (rows[0][0], rows[1][0]) = (tiny, -tiny);
+        rows.push([0.0, 0.0, 0.6, 0.8, 0.0, 0.0]);
+        let parted = Parted::of(&rows, 7, vec![], 1.0).expect("finite");
+        assert!(parted.regular);
+        let found = parted.answer(Wrench::from_array([-1e-3, 0.0, 0.0, 0.0, 0.0, 0.0]));
+        let expected = [1e-3 / (2.0 * tiny), -1e-3 / (2.0 * tiny)];
+        assert!((found[0] / expected[0] - 1.0).abs() < 1e-6 && (found[1] / expected[1] - 1.0).abs() < 1e-6);
+    }
+
+    #[test]
+    fn rates_that_agree_give_the_twist_and_others_none() {
+        for mech in mechanisms() {
+            let n = mech.actuated().count();
+            for state in states(&mech, 5, 5) {
+                let rows = jacobian(&mech, &state.pose);
+                let rate = |row: &[f64; 6]| Wrench::from_array(*row).power(&state.twist);
+                let mut rates: Vec<f64> = rows.iter().map(rate).collect();
+                let found = platform_twist(&mech, &state.pose, &rates[..n + mech.idle.len()]);
+                assert!(found.regular && found.agrees);
+                let off = Twist::new(found.motion.v - state.twist.v, found.motion.omega - state.twist.omega);
+                assert!(off.v.norm() + off.omega.norm() < 1e-10, "{}", mech.name);
+                rates[0] += 1e-3 * norm(&rates);
+                let found = platform_twist(&mech, &state.pose, &rates[..n + mech.idle.len()]);
+                assert!(found.regular && !found.agrees, "{}", mech.name);
+            }
+        }
+    }
+
+    #[test]
+    fn a_square_part_is_just_enough() {
+        for mech in mechanisms() {
+            let square = square(&mech).expect("not singular by design");
+            assert_eq!(square.rows(), 6, "{}", mech.name);
+            let values = Svd::of(&DMatrix::from_fn(6, 6, |i, j| {
+                pure_rows(&square, &mech.home, mech.characteristic_length)[i][j]
+            }));
+            assert!(values.expect("finite").values[5] > 1e-3);
+        }
     }
 }

@@ -53,7 +53,7 @@ pub fn inverse_dynamics_derivatives(
         ("lengths_by_geometry", vec![forces, geometry.len()]),
     ];
     if mech.is_redundant() {
-        return redundant::inverse_dynamics_derivatives(mech, states, loads, set, &given, fields);
+        return redundant::inverse_dynamics_derivatives(mech, states, loads, set, given, fields);
     }
     let varied = geometry.iter().map(|parameter| Varied::new(mech, parameter, set));
     let operation = Derivatives {

@@ -256,7 +256,7 @@ pub(super) fn inverse_dynamics_derivatives(
     states: &States,
     loads: &Loads,
     set: &Set,
-    given: &[bool; MAX_COORDINATES],
+    given: [bool; MAX_COORDINATES],
     fields: [(&'static str, Vec<usize>); 17],
 ) -> Table {
     let numbers: Vec<usize> = (0..set.names().len()).filter(|&k| given[k]).collect();
@@ -279,7 +279,7 @@ pub(super) fn inverse_dynamics_derivatives(
             (0..columns.len()).map(|k| regressor.by_bodies_of(&columns, k)).collect();
         put(mech, rows, i, pair(6), &by_bodies);
 
-        let by = Coordinates::at(mech, set, &still, given, &at.platform);
+        let by = Coordinates::at(mech, set, &still, &given, &at.platform);
         let determined = by.following.pivots > DEPENDENT_PIVOTS;
         let known = |columns: &[Column]| determined && columns.iter().flatten().all(|x| x.is_finite());
         let mut status = Status::Ok;

@@ -125,8 +125,35 @@ pub fn on_rod(count: usize, seed: u64) -> Mechanism {
     generic(&format!("{count} on a rod"), &legs, count, dof, seed)
 }
 
+/// More legs than it takes: two with pins below and UPS legs for more than the freedoms that they leave.
+pub fn redundant(seed: u64) -> Mechanism {
+    let letters: Vec<String> = ["UPS", "UPS", "UPS", "UPS", "UPS", "RPS", "RPS"].map(str::to_owned).to_vec();
+    generic("redundant", &letters, 0, 7, seed)
+}
+
+/// Five legs, or more, whose joints in one body lie on a line.
+pub fn pentapod(count: usize, body: &str, seed: u64) -> Mechanism {
+    let mut spec = generic_spec("pentapod", &vec!["UPS".to_owned(); count], 0, count, seed);
+    let mut draw = Draw::new(seed + 100);
+    let (point, line) = (draw.vector() * 0.1, (Vec3::X + draw.vector()).unit());
+    for leg in spec["legs"].as_array_mut().expect("legs") {
+        leg[body]["point"] = serde_json::json!((point + line * (0.4 * draw.number())).array());
+    }
+    make(&spec.to_string())
+}
+
 /// Generic legs, bodies, load and damping; the last `on_rod` legs stand on a rod, the first `actuated` are driven.
 fn generic(name: &str, letters: &[String], on_rod: usize, actuated: usize, seed: u64) -> Mechanism {
+    make(&generic_spec(name, letters, on_rod, actuated, seed).to_string())
+}
+
+fn generic_spec(
+    name: &str,
+    letters: &[String],
+    on_rod: usize,
+    actuated: usize,
+    seed: u64,
+) -> serde_json::Value {
     let mut draw = Draw::new(seed);
     let rotation = Mat3::from_rotation_vector(draw.vector() * 0.4);
     let home = (draw.vector() * 0.1 + Vec3::new(0.0, 0.0, 1.0), rotation);
@@ -173,14 +200,13 @@ fn generic(name: &str, letters: &[String], on_rod: usize, actuated: usize, seed:
     }
     let rod = serde_json::json!({ "name": "L", "point": point.array(), "axis": line.array(), "body": body(&mut draw, false) });
     let rods = if on_rod > 0 { vec![rod] } else { vec![] };
-    let spec = serde_json::json!({
+    serde_json::json!({
         "name": name, "angles_known": true, "legs": legs, "rods": rods, "platform": body(&mut draw, false),
         "gravity": [0.3, -0.2, -9.81], "efficiency": 0.9, "linear_damping": 3.0, "angular_damping": 0.4,
         "load": { "force": [10.0, -20.0, 30.0], "torque": [4.0, 5.0, -6.0], "axes": "platform" },
         "home": { "position": home.0.array(), "rotation_vector": rotation.rotation_vector().array() },
         "tool": { "point": [0.0, 0.0, 0.1], "axis": [0.0, 0.0, 1.0] },
-    });
-    make(&spec.to_string())
+    })
 }
 
 /// The published manipulator, its numbers straight from Table II.
