@@ -385,6 +385,8 @@ def _answers(mech: pp.Mechanism) -> list[str]:
 
 def text_of(content: bytes) -> str:
     """As a file is read: with any line ends, with a mark of its encoding or without."""
+    if content in (b"\xef", b"\xef\xbb"):
+        return ""  # the beginning of that mark
     text = content.decode("utf-8-sig", errors="replace")
     return text.replace("\r\n", "\n").replace("\r", "\n")
 
@@ -458,7 +460,11 @@ def places(value: Any, place: str = "", path: tuple[Any, ...] = ()) -> Iterator[
         value.items() if isinstance(value, dict) else enumerate(value, 1) if isinstance(value, list) else ()
     )
     for key, entry in entries:
-        word = str(key) if re.fullmatch(r"[\w-]+", str(key), re.ASCII) else json.dumps(key)
+        word = (
+            str(key)
+            if re.fullmatch(r"[\w-]+", str(key), re.ASCII)
+            else json.dumps(key, ensure_ascii=not key.isprintable())
+        )
         at = f"{place}.{word}" if place else word
         yield at, (*path, key)
         yield from places(entry, at, (*path, key))

@@ -137,5 +137,8 @@ def shown(value: object) -> str:
 def place_of(*parts: str | int) -> str:
     """A dotted place from its keys; those that are not bare words in quotes, as in TOML."""
     return ".".join(
-        str(part) if isinstance(part, int) or _BARE.fullmatch(part) else json.dumps(part) for part in parts
+        str(part)
+        if isinstance(part, int) or _BARE.fullmatch(part)
+        else json.dumps(part, ensure_ascii=not part.isprintable())
+        for part in parts
     )
