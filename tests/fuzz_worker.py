@@ -1,4 +1,4 @@
-"""Loads mutated files one after the other and writes what became of each: `fuzz_worker.py FIRST COUNT RESULTS`.
+"""Loads mutated files one by one and writes what became of each: `fuzz_worker.py FIRST COUNT RESULTS`.
 
 A process of its own, so that a hang or a crash takes nothing else with it: a file that takes longer than the
 deadline ends the process, wherever it hangs. The results say how far it came.

@@ -1,7 +1,7 @@
-"""Mechanism files with something wrong in them: what slips of hand, broken editors and hostile minds make of sound ones.
+"""Mechanism files with something wrong in them, as slips of hand, broken editors and hostile minds make them.
 
-`mutated(number)` is the same file for a number every time. A third are changed as bytes, a third as text, a third
-as parsed data; each gets one to three changes.
+`mutated(number)` is the same file for a number every time. A third are changed as bytes, a third as text, a
+third as parsed data; each gets one to three changes.
 """
 
 from __future__ import annotations
@@ -22,177 +22,44 @@ import polypod as pp
 SEED = 70003
 ROOT = Path(__file__).parents[1]
 
-HOSTILE_NUMBERS = (
-    *(
-        "nan",
-        "-nan",
-        "inf",
-        "-inf",
-        "0",
-        "-0",
-        "-0.0",
-        "1e400",
-        "-1e400",
-        "1e308",
-        "1e300",
-        "-1e300",
-        "1e155",
-        "1e100",
-    ),
-    *(
-        "1e-320",
-        "5e-324",
-        "1e-300",
-        "1e-200",
-        "1e-160",
-        "1e-100",
-        "1e-30",
-        "1e30",
-        "1e16",
-        "1e9",
-        "1e-9",
-        "-1",
-    ),
-    *(
-        "9" * 400,
-        "9" * 5000,
-        "1" + "_0" * 30,
-        "0x7fffffffffffffff",
-        "0b11",
-        "1__0",
-        "01",
-        "1.",
-        ".5",
-        "1e",
-        "+1",
-        "--1",
-    ),
-    *(
-        "9223372036854775807",
-        "9223372036854775808",
-        "0.1e-5_0",
-        "3,5",
-        "1 000",
-        "12 mm",
-        "1/2",
-        "pi",
-        "1e5.0",
-    ),
+
+def words(text: str) -> tuple[str, ...]:
+    return tuple(text.split())
+
+
+FLOATS = words(
+    "nan -nan inf -inf 0 -0 -0.0 1e400 -1e400 1e308 1e300 -1e300 1e155 1e100 1e-320 5e-324 1e-300 1e-200 "
+    "1e-160 1e-100 1e-30 1e30 1e16 1e9 1e-9 -1"
 )
+HOSTILE_NUMBERS = (
+    *FLOATS,
+    *("9" * 400, "9" * 5000, "1" + "_0" * 30, "1 000", "12 mm"),
+    *words("0x7fffffffffffffff 0b11 1__0 01 1. .5 1e +1 --1 9223372036854775807 9223372036854775808"),
+    *words("0.1e-5_0 3,5 1/2 pi 1e5.0"),
+)
+LISTED_VALUES = """
+"" | '' | true | false | [] | {} | [[]] | [{}] | [0] | [0, 0, 0] | [0, 0, 0, 0] | [1, 2] | {a = 1} | "nan"
+| 1979-05-27 | 07:32:00 | 1979-05-27T07:32:00Z | "0" | '''x''' | ''' | 'S' | "s" | "mm" | [1, [2], 3] | None
+| [true, false, true] | ["a", "b", "c"] | [nan, nan, nan] | [1e300, 1e300, 1e300] | [1e-300, 0, 0] | null
+| yes | { radius = 1, angle = 2 } | { min = 2, max = 1 } | { min = 0, max = 0 } | "\\ud800" | "\\u0000" | "a\\nb"
+| "ж\\U0001F600" | "\u202e"
+"""
 HOSTILE_VALUES = (
-    *(
-        '""',
-        "''",
-        "true",
-        "false",
-        "[]",
-        "{}",
-        "[[]]",
-        "[{}]",
-        "[0]",
-        "[0, 0, 0]",
-        "[0, 0, 0, 0]",
-        "[1, 2]",
-        "{a = 1}",
-    ),
-    *(
-        "1979-05-27",
-        "07:32:00",
-        "1979-05-27T07:32:00Z",
-        '"nan"',
-        '"0"',
-        "'''x'''",
-        '"""',
-        "'S'",
-        '"s"',
-        '"mm"',
-    ),
-    *(
-        "[" * 40 + "]" * 40,
-        "[" * 5000 + "]" * 5000,
-        "{a=" * 3000 + "1" + "}" * 3000,
-        '"' + "x" * 20_000 + '"',
-    ),
-    *("[" + "1," * 3000 + "]", "[1, [2], 3]", "[true, false, true]", '["a", "b", "c"]', "[nan, nan, nan]"),
-    *(
-        "[1e300, 1e300, 1e300]",
-        "[1e-300, 0, 0]",
-        "{ radius = 1, angle = 2 }",
-        "{ min = 2, max = 1 }",
-        "{ min = 0, max = 0 }",
-    ),
-    *('"\\ud800"', '"\\u0000"', '"ж\\U0001F600"', '"\u202e"', '"a\\nb"', "None", "null", "yes"),
+    *(value.strip() for value in LISTED_VALUES.split("|")),
+    *("[" * 40 + "]" * 40, "[" * 5000 + "]" * 5000, "{a=" * 3000 + "1" + "}" * 3000),
+    *('"' + "x" * 20_000 + '"', "[" + "1," * 3000 + "]", '"""'),
 )
 ODD_CHARACTERS = "\x00\x01\x7f\x85\u2028\u200b\ufeff\r\n\t \"'[]{}=.,#\\-+_éж\U0001f600\u0661"
 TOKEN = re.compile(r"""[\w.+-]+|"[^"\n]*"|'[^'\n]*'|[\[\]{}=,#]""")
 NUMBER = re.compile(r"(?<![\w.\"])[+-]?\d[\d.]*(?:e[+-]?\d+)?(?![\w\"])")
 
-FACTORS = (
-    1e-3,
-    1e3,
-    25.4,
-    1 / 25.4,
-    57.29577951308232,
-    0.017453292519943295,
-    1e6,
-    1e-6,
-    1e12,
-    1e-12,
-    1e150,
-    1e-200,
-)
+FACTORS = (*(1e-3, 1e3, 25.4, 1 / 25.4, 57.2957795, 0.0174532925), *(1e6, 1e-6, 1e12, 1e-12, 1e150, 1e-200))
 LETTERS = ("S", "U", "R", "F", "P", "s", "UU", "")
-KEYS = (
-    *(
-        "name",
-        "description",
-        "source",
-        "units",
-        "length",
-        "angle",
-        "mass",
-        "inertia",
-        "force",
-        "torque",
-        "acceleration",
-    ),
-    *(
-        "load",
-        "home",
-        "position",
-        "rotation_vector",
-        "platform",
-        "center",
-        "dynamics",
-        "gravity",
-        "efficiency",
-        "axes",
-    ),
-    *(
-        "linear_damping",
-        "angular_damping",
-        "tool",
-        "point",
-        "axis",
-        "limits",
-        "sigma_min",
-        "clearance",
-        "joint_reach",
-    ),
-    *(
-        "published",
-        "dof",
-        "redundant",
-        "passive",
-        "rods",
-        "range",
-        "legs",
-        "actuated",
-        "stroke",
-        "radius",
-        "base",
-    ),
-    *("cylinder", "piston", "joint", "normal", "rod", "cone", "min", "max", "z"),
+KEYS = words(
+    "name description source units length angle mass inertia force torque acceleration load home position "
+    "rotation_vector platform center dynamics gravity efficiency axes linear_damping angular_damping tool "
+    "point axis limits sigma_min clearance joint_reach published dof redundant passive rods range legs "
+    "actuated stroke radius base cylinder piston joint normal rod cone min max z"
 )
 ODD_KEYS = ("", "Length", "lenght", "a.b", "a b", "é", "0", "<vector>", "legs.1", "__class__", 'x"y')
 ODD_OBJECTS: tuple[Any, ...] = (
@@ -471,26 +338,9 @@ def repeated_legs(rng: random.Random, text: str) -> str:
 
 
 TEXT = (
-    *(
-        delete_line,
-        duplicate_line,
-        swap_lines,
-        delete_token,
-        other_token,
-        double_token,
-        hostile_value,
-        hostile_value,
-    ),
-    *(
-        hostile_number,
-        hostile_number,
-        hostile_number,
-        slip_of_digits,
-        slip_of_digits,
-        slip_of_digits,
-        other_number,
-    ),
-    *(second_table, other_key, new_entry, other_unit, repeated_legs),
+    *(delete_line, duplicate_line, swap_lines, delete_token, other_token, double_token, hostile_value),
+    *(hostile_value, hostile_number, hostile_number, hostile_number, slip_of_digits, slip_of_digits),
+    *(slip_of_digits, other_number, second_table, other_key, new_entry, other_unit, repeated_legs),
 )
 
 
@@ -618,7 +468,7 @@ nudge = _changed(
     _is_number,
     lambda rng, x: x * (1 + rng.choice((1e-12, 1e-9, 1e-6, 1e-3, 0.1)) * rng.uniform(-1, 1)),
 )
-huge = _changed("huge", _is_number, lambda rng, x: float(rng.choice(HOSTILE_NUMBERS[:26])))
+huge = _changed("huge", _is_number, lambda rng, x: float(rng.choice(FLOATS)))
 retype = _changed(
     "retype", lambda _: True, lambda rng, x: rng.choice((str(x), [x], {"a": x}, [x] * 3, True, None))
 )
@@ -626,40 +476,11 @@ odd = _changed("odd", lambda _: True, lambda rng, x: copy.deepcopy(rng.choice(OD
 move_axis = _changed("move_axis", _is_vector, _turned)
 shuffle = _changed("shuffle", _is_vector, lambda rng, x: rng.sample(x, 3))
 flatten = _changed("flatten", _is_vector, lambda rng, x: [0, 0, 0])
-stretch = _changed("stretch", _is_vector, lambda rng, x: [c * (f := rng.choice(FACTORS)) for c in x])
+stretch = _changed("stretch", _is_vector, lambda rng, x: [c * rng.choice(FACTORS) for c in x])
 letter = _changed("letter", lambda x: x in ("S", "U", "R", "F"), lambda rng, x: rng.choice(LETTERS))
 truth = _changed("truth", lambda x: isinstance(x, bool), lambda rng, x: not x)
 DATA = (
-    *(
-        drop,
-        drop,
-        duplicate,
-        rename,
-        swap,
-        swap,
-        swap_legs,
-        ends_swapped,
-        scaled_all,
-        negate,
-        negate,
-        zero,
-        zero,
-    ),
-    *(
-        rescale,
-        rescale,
-        nudge,
-        huge,
-        huge,
-        retype,
-        odd,
-        odd,
-        move_axis,
-        shuffle,
-        flatten,
-        stretch,
-        letter,
-        letter,
-        truth,
-    ),
+    *(drop, drop, duplicate, rename, swap, swap, swap_legs, ends_swapped, scaled_all, negate, negate),
+    *(zero, zero, rescale, rescale, nudge, huge, huge, retype, odd, odd, move_axis, shuffle, flatten),
+    *(stretch, letter, letter, truth),
 )

@@ -1,7 +1,7 @@
-"""Random mechanisms of all leg kinds, and their mobility from the definition: screws of all joints, loops that close.
+"""Random mechanisms of all leg kinds, and their mobility by definition: screws of all joints, closed loops.
 
-Nothing here is shared with Polypod: a leg is the row of its joints as screws at home, a pose the product of their
-exponentials, and freedoms are null vectors of the loop closures.
+Nothing here is shared with Polypod: a leg is the row of its joints as screws at home, a pose the product of
+their exponentials, and freedoms are null vectors of the loop closures.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ ON_ROD = tuple(f"(R)P{above}" for above in "SURF")
 
 
 def constraints_of(kind: str) -> int:
-    """Of one leg with generic axes: six less the freedoms of its joints. A rod's turning counts as the leg's."""
+    """Of one leg with generic axes: six less its joints' freedoms. A rod's turning counts as the leg's."""
     below, above = ("U" if kind[0] == "(" else kind[0]), kind[-1]
     return max(0, 6 - (FREEDOMS[below] + 1 + FREEDOMS[above]))
 
@@ -77,8 +77,8 @@ def unit(v: Array) -> Array:
 def draw(number: int) -> Drawn:
     """The mechanism of a number, the same every time.
 
-    Its legs have points and axes in general positions, or, every second time, points on a grid and axes that are
-    often parallel, which makes redundant constraints.
+    Its legs have points and axes in general positions, or, every second time, points on a grid and axes that
+    are often parallel, which makes redundant constraints.
     """
     rng = np.random.default_rng([SEED, number])
     style = ("general", "aligned")[number % 2]
@@ -405,6 +405,20 @@ def _screw_of(pose: Array) -> Array:
 def rank(matrix: Array) -> int:
     s = np.linalg.svd(matrix, compute_uv=False)
     return int(np.sum(s > RANK * s[0])) if len(s) and s[0] > 0.0 else 0
+
+
+def clear(drawn: Drawn) -> bool:
+    """Whether the ranks are clear at all poses.
+
+    They are not where loops close as a double root, a leg at a dead point in every pose, say: such poses are
+    known to the square root of rounding, and so are the singular values there. The platform then feels a
+    freedom more than it has.
+    """
+    for q in drawn.poses:
+        s = np.linalg.svd(closures(drawn, chains(drawn, q)[1]), compute_uv=False)
+        if np.any((s > 1e-11 * s[0]) & (s < 1e-5 * s[0])):
+            return False
+    return True
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,6 @@
 """What must hold of a mechanism that has been loaded, and of an error that refuses one.
 
-Written from the page "Mechanism files" alone: keys, units, polar points and turns are converted here once more.
+Written from the page "Mechanism files" alone: keys, units, polar points and turns are read here once more.
 """
 
 from __future__ import annotations

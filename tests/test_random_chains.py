@@ -1,6 +1,6 @@
 """Random mechanisms of all leg kinds against screws and loops in numpy, and against their twins in Pinocchio.
 
-What becomes of one: `python tests/test_random_chains.py NUMBER`; numbers by leg kind of many: `... FIRST COUNT`.
+What becomes of one: `python tests/test_random_chains.py NUMBER`; of many, by leg kind: `... FIRST COUNT`.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from polypod import Status
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from random_chains import KINDS, ON_ROD, Drawn, Mobility, chains, draw, slides
+from random_chains import KINDS, ON_ROD, Drawn, Mobility, chains, clear, draw, of_geometry, slides
 
 Array = NDArray[np.float64]
 
@@ -30,6 +30,8 @@ BATCHES = 40
 SAMPLE = 20
 """Of so many, one is held against its twin."""
 TWIN_POSES = 3
+UNCLEAR = "no clear rank"
+"""Left out, and not many."""
 LENGTHS = 1e-10
 """Relative to the longest leg: loops are closed to 1e-13, nearly singular ones magnify that."""
 REGULAR = 1e-3
@@ -60,6 +62,9 @@ def examine(number: int) -> Outcome:
     drawn = draw(number)
     own, out = Mobility.of(drawn), Outcome(number, drawn.kinds)
     actuators = sum(leg.actuated for leg in drawn.legs)
+    if not clear(drawn):
+        out.refused = UNCLEAR
+        return out
     try:
         mech = pp.Mechanism.from_dict(drawn.data)
     except pp.MechanismError as error:
@@ -161,14 +166,14 @@ def table(outcomes: list[Outcome]) -> str:
             max((out.lengths or 0.0 for out in loaded), default=0.0),
             max((o.twin for o in twins), default=0.0),
         )
-        rows.append(
-            f"| {kind} | {len(of)} | {len(of) - len(loaded)} | {len(loaded)} | {worst[0]:.1e} | {len(twins)} | {worst[1]:.1e} |"
-        )
+        numbers = f"{len(of)} | {len(of) - len(loaded)} | {len(loaded)} | {worst[0]:.1e} | {len(twins)}"
+        rows.append(f"| {kind} | {numbers} | {worst[1]:.1e} |")
     reasons = Counter(out.refused for out in outcomes if out.refused)
     return "\n".join([*rows, "", *(f"{number} {reason}" for reason, number in reasons.items())])
 
 
 def check(outcomes: list[Outcome]) -> None:
+    assert sum(out.refused == UNCLEAR for out in outcomes) <= 1 + len(outcomes) / 100
     wrong = [f"{out.number} {'+'.join(out.kinds)}: {out.wrong}" for out in outcomes if out.wrong]
     assert not wrong, "\n".join(wrong[:20])
 
@@ -199,9 +204,7 @@ def test_many_mechanisms(batch: int) -> None:
     [("3-rps", 3, 0), ("tsai-6-sps", 6, 6), ("exechon", 3, 0), ("3-upu", 3, 0), ("2upr-rpu", 3, 0)],
 )
 def test_screws_give_the_freedoms_of_the_catalogue(name: str, dof: int, passive: int) -> None:
-    """The numpy side by itself, on mechanisms whose freedoms are known: their geometry made of screws here."""
-    from random_chains import of_geometry
-
+    """The numpy side by itself, on mechanisms whose freedoms are known."""
     found = Mobility.of(of_geometry(pp.load(name).geometry))
     assert (found.dof, found.passive) == (dof, passive)
 

@@ -35,7 +35,7 @@ def read_toml(text: str) -> dict[str, Any] | Fault:
             return Fault("toml", f"{where[1]}, at the end of the text", text.rstrip("\n").count("\n") + 1)
         return Fault("toml", f"{where[1]}, at column {where[3]}", int(where[2]))
     except ValueError:
-        digits = re.compile(r"\d{%d}" % _LONGEST_INTEGER)
+        digits = re.compile(rf"\d{{{_LONGEST_INTEGER}}}")
         found = (i for i, line in enumerate(text.split("\n"), 1) if digits.search(line.replace("_", "")))
         return Fault("toml", f"holds an integer of more than {_LONGEST_INTEGER} digits", next(found, None))
     except RecursionError:

@@ -222,7 +222,7 @@ LARGEST = {
     **{"length": 1e4, "angle": 4 * math.pi, "mass": 1e9, "inertia": 1e15, "force": 1e12, "torque": 1e12},
     "acceleration": 1e6,
 }
-"""Of each kind in SI: beyond that a number is a slip, in its unit or its digits, and squares of it overflow."""
+"""Of each kind in SI: beyond that a number is a slip, in its unit or its digits."""
 
 _Quantity = tuple[tuple[str | int, ...], str, float]
 
