@@ -63,7 +63,7 @@ KNOWN = {
     "3-prs": Known(3, "as 3-rps, whose legs these are with the carriages at rest", 16),
     "3-puu": Known(3, "three translations: Tsai 1996, Li, Xu 2006"),
     "3-upu": Known(3, "three translations: Tsai 1996"),
-    "3-upu-snu": Known(3, "three translations but at singular poses: Zlatanov, Bonev, Gosselin 2002"),
+    "3-upu-snu": Known(3, "three translations but at singular poses; 78: Walter, Husty, Pfurner 2009", 78),
     "4-rpr": Known(3, "as 3-rpr"),
     "4pss-upu": Known(5, LEAST),
     "4sps-spr": Known(5, LEAST),
@@ -237,6 +237,20 @@ def apart(mech: pp.Mechanism, a: Array, b: Array) -> Array:
     scale = np.ones((4, 4))
     scale[:3, 3] = mech.characteristic_length
     return abs((a - b) / scale).max(axis=(-1, -2))
+
+
+@pytest.mark.parametrize("name", ["3-upu-snu", "3-rpr"])
+def test_modes_in_the_base_plane_are_their_own_images(name: str) -> None:
+    """Where a platform lies in the base plane: once among the modes, as regular as the pose is."""
+    mech, pose = load(name), np.eye(4)
+    pose[:2, :2] = [[np.cos(0.7), -np.sin(0.7)], [np.sin(0.7), np.cos(0.7)]]
+    pose[:2, 3] = 0.03, -0.05
+    modes = mech.assembly_modes(mech.inverse_kinematics(pose).lengths)
+    [here] = np.flatnonzero(apart(mech, modes.pose, pose) < POSE)
+    assert mech.conditioning(pose).sigma_min > 0.1
+    assert int(modes.multiplicity[here]) == 1
+    assert abs(modes.determinant_sign[here]) == 1.0
+    assert Status(int(modes.status)) is Status.OK
 
 
 # --- dynamics against Pinocchio -----------------------------------------------------------------------------

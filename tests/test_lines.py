@@ -47,8 +47,8 @@ angle = 3
         ("legs.2.stroke.max", 13),
         ("legs.2.platform.joint", 17),
         ("legs.2.platform.cone.angle", 20),
-        ("legs", None),
-        ("legs.3.stroke", None),
+        ("legs", 9),
+        ("legs.3.stroke", 9),
         ("home", None),
     ],
 )

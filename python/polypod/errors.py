@@ -4,8 +4,13 @@ from __future__ import annotations
 
 import difflib
 import json
+import re
 from collections.abc import Iterable
 from dataclasses import dataclass
+
+_BARE = re.compile(r"[A-Za-z0-9_-]+")
+_LONGEST_SHOWN = 80
+"""Characters of a value in a message."""
 
 
 class PolypodError(Exception):
@@ -118,5 +123,22 @@ def alternatives(name: str, valid: Iterable[str]) -> str:
 
 
 def shown(value: object) -> str:
-    """A value as a file writes it; a table is only called one."""
-    return "a table" if isinstance(value, dict) else json.dumps(value, ensure_ascii=False, default=str)
+    """A value as a file writes it, the beginning of a long one; a table is only called one."""
+    if isinstance(value, dict):
+        return "a table"
+    try:
+        text = json.dumps(value, ensure_ascii=False, default=str)
+    except (RecursionError, ValueError):  # too deep, or with too many digits
+        return "a value that is too long to be shown"
+    text = text if text.isprintable() else json.dumps(value, default=str)
+    return text if len(text) <= _LONGEST_SHOWN else f"{text[: _LONGEST_SHOWN - 4]} ..."
+
+
+def place_of(*parts: str | int) -> str:
+    """A dotted place from its keys; those that are not bare words in quotes, as in TOML."""
+    return ".".join(
+        str(part)
+        if isinstance(part, int) or _BARE.fullmatch(part)
+        else json.dumps(part, ensure_ascii=not part.isprintable())
+        for part in parts
+    )

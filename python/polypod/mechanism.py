@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import copy
 import json
-import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
@@ -53,7 +52,7 @@ from polypod.errors import (
     WorkspaceError,
     alternatives,
 )
-from polypod.lines import line_of
+from polypod.lines import line_of, read_toml
 from polypod.schema import read_spec
 from polypod.screws import Screws, constraint_screws, freedom_screws
 from polypod.singularity import (
@@ -125,10 +124,9 @@ class Mechanism:
 
         Raises MechanismError with every fault and its place.
         """
-        try:
-            data = tomllib.loads(text)
-        except tomllib.TOMLDecodeError as error:
-            raise MechanismError([Fault("toml", str(error))], origin) from None
+        data = read_toml(text)
+        if isinstance(data, Fault):
+            raise MechanismError([data], origin)
         return cls(data, text=text, origin=origin)
 
     @classmethod
@@ -1274,10 +1272,13 @@ def _in_words(names: Sequence[str]) -> str:
 
 
 def _plain(value: Any) -> Any:
-    """A file's content in the types that reading one gives, whatever arrays and sequences it is made of."""
+    """A file's content in the types that reading one gives, whatever arrays and sequences it is made of.
+
+    A file cannot hold None: it stands for an entry that is not there.
+    """
     match value:
         case Mapping():
-            return {str(key): _plain(entry) for key, entry in value.items()}
+            return {str(key): _plain(entry) for key, entry in value.items() if entry is not None}
         case np.ndarray() | np.generic():
             return value.tolist()
         case list() | tuple():

@@ -6,15 +6,16 @@ its leg) the core checks, on all parts that could be read.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from typing import Annotated, Any, Literal, TypeVar
 
 import numpy as np
-from annotated_types import Ge, Len, MinLen
+from annotated_types import Ge, Len
 from pydantic import BaseModel, ConfigDict, Discriminator, Field, Strict, Tag, ValidationError
 
-from polypod.errors import Fault, alternatives, shown
-from polypod.units import MECHANISM_KINDS, Units, cos_sin, read_units
+from polypod.errors import Fault, alternatives, place_of, shown
+from polypod.units import MECHANISM_KINDS, Units, cos_sin, from_si, read_units
 
 STANDARD_GRAVITY = (0.0, 0.0, -9.81)
 """m/s^2 in base axes, where the file gives none."""
@@ -29,10 +30,12 @@ class Table(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 
-# Tags end up in the place of an error; <...> marks them, so that they can be left out of it again.
+# Tags end up in the place of an error, and are left out of it again.
+_TAGS = ("<polar>", "<vector>", "<number>", "<matrix>")
 Number = Annotated[float, Strict(), Field(allow_inf_nan=False)]
 Count = Annotated[int, Strict(), Ge(0)]
 Vector = Annotated[list[Number], Len(3, 3)]
+Name = Annotated[str, Field(pattern=r"^\P{C}*[^\p{C}\p{Z}]\P{C}*$")]
 
 
 def _polar_or_vector(value: object) -> str:
@@ -77,7 +80,7 @@ Inertia = Annotated[_N | _V | _M, Discriminator(_number_vector_or_matrix)]
 class Header(Table):
     """What stands above the first table."""
 
-    name: Annotated[str, MinLen(1)]
+    name: Name
     description: str = ""
     source: str = ""
 
@@ -150,7 +153,7 @@ class Range(Table):
 class Rod(Table):
     """Rod axes are (L, n, L x n); `center` counts from `point`."""
 
-    name: str
+    name: Name
     point: Point
     axis: Axis
     mass: Number | None = None
@@ -209,7 +212,7 @@ class Leg(Table):
     With `slider`: a carriage on a rail, the base joint on it, and a strut from there to the platform joint.
     """
 
-    name: str | None = None
+    name: Name | None = None
     actuated: Annotated[bool, Strict()] = True
     slider: Slider | None = None
     stroke: Stroke | None = None
@@ -242,6 +245,13 @@ KIND_OF_KEY = {
     "gravity": "acceleration",
 }
 
+LARGEST = {
+    **{"length": 1e4, "angle": 4 * math.pi, "mass": 1e9, "inertia": 1e15, "force": 1e12, "torque": 1e12},
+    "acceleration": 1e6,
+}
+"""Of each kind in SI: beyond that a number is a slip, in its unit or its digits."""
+
+_Quantity = tuple[tuple[str | int, ...], str, float]
 
 # --- from the file to SI ------------------------------------------------------------------------------------
 
@@ -253,9 +263,12 @@ def read_spec(data: dict[str, Any]) -> tuple[dict[str, Any], list[Fault]]:
     all others; the description stands for the file only if there are no faults.
     """
     units, faults = read_units(data.get("units", {}), set(_kinds(data)), MECHANISM_KINDS)
+    faults += _too_large(data, units)
     header = {key: value for key, value in data.items() if key in Header.model_fields}
     keys = (*Header.model_fields, *SECTIONS)
-    faults += [Fault(key, f"is no key here; {alternatives(key, keys)}") for key in data if key not in keys]
+    faults += [
+        Fault(place_of(key), f"is no key here; {alternatives(key, keys)}") for key in data if key not in keys
+    ]
 
     head = read_table(Header, header, "", faults)
     dynamics = read_table(Dynamics, data.get("dynamics", {}), "dynamics", faults) or Dynamics()
@@ -313,6 +326,28 @@ def _kinds(data: object) -> Iterator[str]:
     elif isinstance(data, (list, tuple)):
         for value in data:
             yield from _kinds(value)
+
+
+def _quantities(value: object, kind: str | None = None, *path: str | int) -> Iterator[_Quantity]:
+    """Every number that has a kind, with its place and the kind."""
+    if isinstance(value, dict):
+        for key, entry in value.items():
+            yield from _quantities(entry, KIND_OF_KEY.get(key, kind), *path, key)
+    elif isinstance(value, (list, tuple)):
+        for i, entry in enumerate(value, 1):
+            yield from _quantities(entry, kind, *path, i)
+    elif kind and isinstance(value, (int, float)):
+        yield path, kind, value
+
+
+def _too_large(data: dict[str, Any], units: Units) -> Iterator[Fault]:
+    """Faults of numbers beyond the largest of their kind."""
+    largest = {kind: from_si(LARGEST[kind], kind, unit) for kind, unit in units.chosen.items()}
+    for path, kind, value in _quantities(data):
+        if kind in largest and largest[kind] < abs(value) < math.inf:
+            most, unit = largest[kind], units.of(kind)
+            message = f"is {shown(value)} {unit}, more than {most:.4g} {unit}; check the number and its unit"
+            yield Fault(place_of(*path), message)
 
 
 def _list(data: dict[str, Any], key: str, faults: list[Fault]) -> list[Any]:
@@ -495,7 +530,7 @@ _NEEDED = {
     "int_type": "a whole number",
     "bool_type": "true or false",
     "string_type": "text in quotes",
-    "string_too_short": "some text",
+    "string_pattern_mismatch": "some text in one line",
 }
 
 
@@ -510,7 +545,10 @@ def read_table(model: type[AnyTable], data: object, place: str, faults: list[Fau
         problems = error.errors(include_url=False)
     wrong = set()
     for problem in problems:
-        path = [part for part in problem["loc"] if not str(part).startswith("<")]
+        *holders, last = problem["loc"] or ("",)
+        path = [part for part in (*holders, last) if part not in _TAGS and part != ""]
+        if problem["type"] == "extra_forbidden":  # whatever the file calls it
+            path = [*(part for part in holders if part not in _TAGS), last]
         faults.append(Fault(_place(place, path), _message(model, path, dict(problem))))
         if path and problem["type"] != "extra_forbidden":
             wrong.add(path[0])
@@ -525,8 +563,8 @@ def read_table(model: type[AnyTable], data: object, place: str, faults: list[Fau
 
 def _place(section: str, path: list[int | str]) -> str:
     """Dotted, list entries counted from 1."""
-    parts = [str(part + 1) if isinstance(part, int) else part for part in path]
-    return ".".join([section, *parts] if section else parts)
+    inside = place_of(*(part + 1 if isinstance(part, int) else part for part in path))
+    return ".".join(part for part in (section, inside) if part)
 
 
 def _message(model: type[Table], path: list[int | str], problem: dict[str, Any]) -> str:

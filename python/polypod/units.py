@@ -10,7 +10,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from polypod.errors import Fault, UnknownNameError, alternatives, shown
+from polypod.errors import Fault, UnknownNameError, alternatives, place_of, shown
 
 Value = TypeVar("Value", float, NDArray[np.float64])
 
@@ -115,7 +115,9 @@ def read_units(table: object, used: Collection[str], kinds: Collection[str]) -> 
     chosen, faults = {}, []
     for kind, unit in table.items():
         if kind not in kinds:
-            faults.append(Fault(f"units.{kind}", f"is no kind of quantity here; {alternatives(kind, kinds)}"))
+            faults.append(
+                Fault(place_of("units", kind), f"is no kind of quantity here; {alternatives(kind, kinds)}")
+            )
         elif not isinstance(unit, str) or unit not in UNITS[kind]:
             faults.append(Fault(f"units.{kind}", f"is {shown(unit)}; {alternatives(str(unit), UNITS[kind])}"))
         else:

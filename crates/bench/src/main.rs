@@ -13,7 +13,7 @@ use std::ops::{Add, Div, Mul, Neg, Sub};
 use std::time::Instant;
 
 use polypod_core::dynamics::inverse_dynamics;
-use polypod_core::forward::{step_of, system};
+use polypod_core::forward::{Asked, step_of, system};
 use polypod_core::forward_dynamics::forward_dynamics;
 use polypod_core::jacobian::jacobian;
 use polypod_core::lanes::{Lanes, Task, dispatch};
@@ -127,7 +127,7 @@ fn counts(mech: &Mechanism, state: &Motion<f64>) -> serde_json::Value {
     let Motion { pose, twist, .. } = &platform;
     let load = Wrench::new(lift(mech.load.wrench.force), lift(mech.load.wrench.torque));
     let forces = [Counted(100.0); 6];
-    let squares = [Counted(0.5); 6];
+    let asked = [Asked { place: Counted(0.0), square: Counted(0.5) }; 6];
     json!({
         "inverse_kinematics": counts_of(|| for leg in &mech.legs { black_box(leg::position(leg, pose)); }),
         "jacobian": counts_of(|| jacobian(mech, pose)),
@@ -135,7 +135,7 @@ fn counts(mech: &Mechanism, state: &Motion<f64>) -> serde_json::Value {
         "inverse_dynamics": counts_of(|| inverse_dynamics(mech, &platform, load)),
         "forward_dynamics": counts_of(|| forward_dynamics(mech, pose, twist, &forces[..mech.dof()], load)),
         "forward_kinematics": counts_of(|| {
-            let at = system(mech, pose, &squares);
+            let at = system(mech, pose, &asked);
             let step = solve(at.matrix, at.residual.map(|f| -f)).x;
             pose.stepped(&step_of(mech, step, Counted(1.0)))
         }),

@@ -20,6 +20,9 @@ const HOME_TOLERANCE: f64 = 1e-6;
 /// Legs shorter than this share of the characteristic length have coincident joints.
 const LENGTH_TOLERANCE: f64 = 1e-9;
 
+/// The shortest leg, m: below it the unit of lengths is wrong, and constraints in metres drown in rounding.
+const SHORTEST_LEG: f64 = 1e-6;
+
 /// The mechanism that a spec describes.
 ///
 /// # Errors
@@ -57,11 +60,9 @@ fn build(spec: &Spec, home: Pose<f64>) -> Mechanism {
     let reach: f64 = legs.iter().map(|leg| leg.platform.point.dot(leg.platform.point)).sum();
     let mean_square = reach / mobility::count(legs.len());
     // A platform that is a point has no size of its own; the home lengths then set the scale.
-    let characteristic_length = if mean_square > 0.0 {
-        mean_square.sqrt()
-    } else {
-        legs.iter().map(|leg| leg::position(leg, &home).length).fold(0.0, f64::max)
-    };
+    let longest = legs.iter().map(|leg| leg::position(leg, &home).length).fold(0.0, f64::max);
+    let is_point = mean_square.sqrt() <= LENGTH_TOLERANCE * longest;
+    let characteristic_length = if is_point { longest } else { mean_square.sqrt() };
 
     Mechanism {
         name: spec.name.clone(),
@@ -192,10 +193,12 @@ fn check_ends(spec: &Spec) -> Vec<Fault> {
                 continue;
             };
             if same(a.base.point, b.base.point) && same(a.platform.point, b.platform.point) {
+                // Once is enough: in a file with its legs many times, each would coincide with many.
                 faults.push(Fault::new(
                     format!("legs.{}", j + 1),
                     format!("its base point and platform point coincide with those of legs.{}", i + 1),
                 ));
+                break;
             }
         }
     }
@@ -222,6 +225,14 @@ fn check_leg_at_home(spec: &Spec, place: &str, leg: &LegSpec, home: &Pose<f64>) 
     }
     if r.norm() <= LENGTH_TOLERANCE * (leg.base.point.norm() + e.norm() + home.o.norm()) || r.norm() == 0.0 {
         faults.push(Fault::new(place, "base point and platform point coincide at the home pose"));
+        return faults;
+    }
+    if r.norm() < SHORTEST_LEG {
+        let message = format!(
+            "is {:.3e} m long at the home pose, less than {SHORTEST_LEG:e} m; check the unit of length",
+            r.norm()
+        );
+        faults.push(Fault::new(place, message));
         return faults;
     }
     let delta = r.unit();

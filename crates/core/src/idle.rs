@@ -249,7 +249,7 @@ mod tests {
                 for state in states(&mech, 4, 2) {
                     let spin = twist(idle, &state.pose);
                     for leg in &mech.legs {
-                        let rate = leg::row(&leg::position(leg, &state.pose)).power(&spin);
+                        let rate = leg::row(leg, &leg::position(leg, &state.pose)).power(&spin);
                         assert!(rate.abs() < 1e-14, "{rate}");
                     }
                     assert!((row(idle, &state.pose).power(&spin) - 1.0).abs() < 1e-14);

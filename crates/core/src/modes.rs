@@ -65,6 +65,8 @@ const MOST_SOLUTIONS: usize = 1000;
 pub struct Start {
     asked: [Asked<C>; 6],
     poses: Vec<Pose<C>>,
+    /// Which of the poses are their own images by the reflection: those of a platform in the base plane.
+    own_images: Vec<bool>,
     mirror: Option<Mirror>,
     /// With as many of its legs actuated as it takes, where there are more.
     square: Option<Box<Mechanism>>,
@@ -74,18 +76,18 @@ impl Start {
     /// Number of complex solutions of the equations for generic lengths.
     #[must_use]
     pub fn solutions(&self) -> usize {
-        self.poses.len() * if self.mirror.is_some() { 2 } else { 1 }
+        let images =
+            if self.mirror.is_some() { self.own_images.iter().filter(|own| !**own).count() } else { 0 };
+        self.poses.len() + images
     }
 
     /// Adds a solution for the generic lengths, if it is a new one.
     fn extend(&mut self, mech: &Mechanism, pose: Pose<C>) {
         if self.poses.is_empty() {
-            // The reflection is one only if it maps solutions to solutions: axes must agree with it too. And to others: a
-            // planar mechanism stays in the plane.
+            // The reflection is one only if it maps solutions to solutions: the planes of rods must agree with it too.
             self.mirror = self.mirror.filter(|m| {
-                let mirrored = m.apply(&pose);
-                let residual = system(mech, &mirrored, &self.asked).residual;
-                residual.iter().all(|f| f.norm() < SAME) && distance(mech, &mirrored, &pose) > SAME
+                let residual = system(mech, &m.apply(&pose), &self.asked).residual;
+                residual.iter().all(|f| f.norm() < SAME)
             });
         }
         let mirrored = self.mirror.map(|m| m.apply(&pose));
@@ -94,6 +96,7 @@ impl Start {
         };
         if !self.poses.iter().any(same) {
             self.poses.push(pose);
+            self.own_images.push(mirrored.is_some_and(|m| distance(mech, &pose, &m) < SAME));
         }
     }
 
@@ -120,7 +123,12 @@ impl Mirror {
         let platform: Vec<Vec3<f64>> = mech.legs.iter().map(|leg| leg.platform.point).collect();
         let (base_point, base_normal) = plane(&base)?;
         let (platform_point, platform_normal) = plane(&platform)?;
-        Some(Mirror { base_normal, base_point, platform_normal, platform_point })
+        // Axes must be their own images, up to their sign.
+        let kept = |a: Vec3<f64>, n: Vec3<f64>| a.dot(n).abs().min(a.cross(n).norm()) <= 1e-12 * a.norm();
+        mech.constraints
+            .iter()
+            .all(|c| kept(c.base_axis, base_normal) && kept(c.platform_axis, platform_normal))
+            .then_some(Mirror { base_normal, base_point, platform_normal, platform_point })
     }
 
     /// `R' = S_B R S_P`, and the platform's plane point moves as its reflection.
@@ -172,7 +180,8 @@ pub fn start(mech: &Mechanism) -> Option<Start> {
     }
     let mut draw = Draw(0x9E37_79B9_7F4A_7C15);
     let asked = generic(mech, GENERIC, &mut draw);
-    let mut result = Start { asked, poses: Vec::new(), mirror: Mirror::of(mech), square: None };
+    let mut result =
+        Start { asked, poses: Vec::new(), own_images: Vec::new(), mirror: Mirror::of(mech), square: None };
     // Every component of the set of complex poses has its own solutions: random poses reach each of them.
     for _ in 0..SEEDS {
         if let Some(pose) = random_pose(mech, &mut draw) {
@@ -395,9 +404,9 @@ pub fn assembly_modes(mech: &Mechanism, start: &Start, lengths: &[f64]) -> Modes
     }
     let up = upward(mech);
     let mut modes: Vec<Mode> = Vec::new();
-    for end in ends {
+    for (end, own_image) in ends.into_iter().zip(&start.own_images) {
         let (End::Regular(pose) | End::Singular(pose)) = end else { continue };
-        let mirrored = start.mirror.map(|m| m.apply(&pose));
+        let mirrored = start.mirror.filter(|_| !own_image).map(|m| m.apply(&pose));
         for pose in std::iter::once(pose).chain(mirrored) {
             if let Some(mode) = real_mode(mech, &asked, &pose, up) {
                 keep(mech, &mut modes, mode);

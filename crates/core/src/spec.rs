@@ -3,6 +3,7 @@
 //! checked where they are put together, in [`assemble`](crate::assembly::assemble).
 
 use std::f64::consts::TAU;
+use std::ops::RangeInclusive;
 
 use serde::Deserialize;
 
@@ -300,8 +301,14 @@ impl Faults {
     }
 
     fn axis(&mut self, place: &str, a: Vec3<f64>) {
-        if self.finite3(place, a) && a.norm() == 0.0 {
+        if !self.finite3(place, a) {
+            return;
+        }
+        let length = a.norm();
+        if length == 0.0 {
             self.add(place, "is zero; an axis needs a direction");
+        } else if !AXIS_LENGTHS.contains(&length) {
+            self.add(place, format!("has the length {length:e}; must be between 1e-100 and 1e100"));
         }
     }
 
@@ -504,6 +511,9 @@ impl Faults {
         }
     }
 }
+
+/// Lengths of axes in a file: any, as long as squares of it are numbers.
+const AXIS_LENGTHS: RangeInclusive<f64> = 1e-100..=1e100;
 
 /// Sine of the largest angle by which axes given in a file may miss their relation.
 pub const ANGLE_TOLERANCE: f64 = 1e-6;
