@@ -1,4 +1,4 @@
-"""Polypod analyses parallel manipulators on telescopic legs.
+"""Polypod analyses parallel manipulators on telescopic legs or on struts that slide on rails.
 
 SI units and radians in every array; six-vectors are linear part first, at the platform's point o, in base
 axes; poses are homogeneous matrices `(..., 4, 4)`; leading axes are a batch. Legs are numbered from 1 in
