@@ -673,7 +673,7 @@ class Mechanism:
 
         Idle freedoms keep the spin of the guess [T71]. Lengths of redundant actuators must agree: the pose
         has all of them, to 1e-6 of the characteristic length, or the status is INCONSISTENT and there is
-        none, only the `residual` of the nearest [T73]; there are no modes to jump between. A design that is
+        none, only the `residual` of the nearest [T73]; MODE_JUMP is not told then. A design that is
         singular at every pose has a curve of poses for the lengths that it can have at all: the status is
         SINGULAR with one of them, INCONSISTENT for lengths that it cannot have.
 
