@@ -20,7 +20,7 @@ from polypod import SingularityKind, Status
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from random_chains import KINDS, ON_ROD, Drawn, Mobility, chains, clear, draw, of_geometry, slides
+from random_chains import KINDS, ON_ROD, Drawn, Mobility, chains, clear, draw, extent, of_geometry, slides
 
 Array = NDArray[np.float64]
 
@@ -31,7 +31,7 @@ SAMPLE = 20
 """Of so many, one is held against its twin."""
 TWIN_POSES = 3
 UNCLEAR = "no clear rank"
-"""Left out, and not many."""
+"""Of these the freedoms alone are compared; there are not many."""
 LENGTHS = 1e-10
 """Relative to the longest leg: loops are closed to 1e-13, nearly singular ones magnify that."""
 REGULAR = 1e-3
@@ -63,7 +63,7 @@ def examine(number: int) -> Outcome:
     own, out = Mobility.of(drawn), Outcome(number, drawn.kinds)
     actuators = sum(leg.actuated for leg in drawn.legs)
     if not clear(drawn):
-        out.refused = UNCLEAR
+        out.refused, out.wrong = UNCLEAR, shaky(drawn)
         return out
     try:
         mech = pp.Mechanism.from_dict(drawn.data)
@@ -84,6 +84,17 @@ def examine(number: int) -> Outcome:
     if number % SAMPLE == 0:
         dynamics(mech, drawn, out)
     return out
+
+
+def shaky(drawn: Drawn) -> list[str]:
+    """What is wrong with the freedoms of a mechanism whose ranks are not clear."""
+    dof = extent(drawn)
+    try:
+        found = pp.Mechanism.from_dict(drawn.data).dof
+    except pp.MechanismError as error:
+        said = re.search(r"for (\d+) freedoms", str(error))
+        found = int(said[1]) if said else 0
+    return [] if found == dof else [f"{found} freedoms, but poses in {dof} directions"]
 
 
 def refusal(error: pp.MechanismError, own: Mobility, actuators: int) -> tuple[str, list[str]]:
@@ -109,7 +120,7 @@ def kinematics(mech: pp.Mechanism, drawn: Drawn, out: Outcome) -> None:
     if not out.lengths < LENGTHS:
         out.wrong.append(f"lengths differ by {out.lengths:.2g}: {found.status}")
     regular = mech.conditioning(poses).sigma_min > REGULAR
-    # Where rows depend on one another while redundant ones hold the platform there is no answer: a kind of its own.
+    # Where rows depend on one another while redundant ones hold the platform: no answer, a kind of its own.
     regular &= mech.singularity(poses).kind == SingularityKind.NONE
     if not (found.status[regular] == Status.OK).all():
         out.wrong.append(f"inverse kinematics has status {found.status} at regular poses")
