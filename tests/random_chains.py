@@ -412,13 +412,23 @@ def clear(drawn: Drawn) -> bool:
 
     They are not where loops close as a double root, a leg at a dead point in every pose, say: such poses are
     known to the square root of rounding, and so are the singular values there. The platform then feels a
-    freedom more than it has.
+    freedom more than it has: `extent` counts those that it has.
     """
     for q in drawn.poses:
         s = np.linalg.svd(closures(drawn, chains(drawn, q)[1]), compute_uv=False)
         if np.any((s > 1e-11 * s[0]) & (s < 1e-5 * s[0])):
             return False
     return True
+
+
+def extent(drawn: Drawn) -> int:
+    """Freedoms of the platform from the poses that it has near home: in how many directions they lie."""
+    reach, moves = 0.02, []
+    for q in positions(drawn, 30, reach):
+        by = chains(drawn, q)[0][0]
+        moves.append([*((by @ drawn.home)[:3, 3] - drawn.home[:3, 3]), *rotation_vector(by[:3, :3])])
+    # Paths are bent by a fiftieth; double roots are known to 3e-7.
+    return int(np.sum(np.linalg.svd(np.array(moves), compute_uv=False) > 0.1 * reach))
 
 
 @dataclass(frozen=True)

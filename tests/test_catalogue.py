@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from PIL import Image
+from scipy.spatial.transform import Rotation
 
 import polypod as pp
 from polypod import SingularityKind, Status
@@ -251,6 +252,15 @@ def test_modes_in_the_base_plane_are_their_own_images(name: str) -> None:
     assert int(modes.multiplicity[here]) == 1
     assert abs(modes.determinant_sign[here]) == 1.0
     assert Status(int(modes.status)) is Status.OK
+
+
+def test_modes_that_turn_about_the_centre() -> None:
+    """Of a 3-UPU with radial axes: all of them meet there, and the platform may turn as it likes."""
+    mech, pose = load("3-upu-snu"), np.eye(4)
+    pose[:3, :3] = Rotation.from_rotvec([0.4, -0.7, 0.3]).as_matrix()
+    modes = mech.assembly_modes(mech.inverse_kinematics(pose).lengths)
+    assert mech.conditioning(pose).sigma_min > 0.01
+    assert np.sum(apart(mech, modes.pose, pose) < POSE) == 1
 
 
 # --- dynamics against Pinocchio -----------------------------------------------------------------------------

@@ -51,6 +51,13 @@ const LOOPS: [f64; 2] = [30.0, 100.0];
 /// Random poses to begin with.
 const SEEDS: usize = 40;
 
+/// Random poses with the platform in the middle of the base. Where axes meet in one point the platform may turn about it;
+/// from afar that component is hardly ever reached.
+const SEEDS_IN_THE_MIDDLE: usize = 20;
+
+/// How far from the middle those are, in lengths of the longest leg.
+const MIDDLE: f64 = 0.03;
+
 /// Loops in a row that must find nothing new before the solutions count as complete.
 const CONFIRMATIONS: usize = 16;
 
@@ -183,8 +190,8 @@ pub fn start(mech: &Mechanism) -> Option<Start> {
     let mut result =
         Start { asked, poses: Vec::new(), own_images: Vec::new(), mirror: Mirror::of(mech), square: None };
     // Every component of the set of complex poses has its own solutions: random poses reach each of them.
-    for _ in 0..SEEDS {
-        if let Some(pose) = random_pose(mech, &mut draw) {
+    for i in 0..SEEDS + SEEDS_IN_THE_MIDDLE {
+        if let Some(pose) = random_pose(mech, &mut draw, i >= SEEDS) {
             let path = Path { mech, from: asked_at(mech, &pose), to: asked, precision: CLOSE };
             for pose in path.follow(&[pose]).into_iter().filter_map(End::regular) {
                 result.extend(mech, pose);
@@ -217,14 +224,23 @@ pub fn start(mech: &Mechanism) -> Option<Start> {
     None
 }
 
-/// A random complex pose that satisfies the constraints, about as far from home as the mechanism is large.
-fn random_pose(mech: &Mechanism, draw: &mut Draw) -> Option<Pose<C>> {
+/// A random complex pose that satisfies the constraints, about as far from home as the mechanism is large, or with the
+/// platform joints about the middle of the base joints.
+fn random_pose(mech: &Mechanism, draw: &mut Draw, in_the_middle: bool) -> Option<Pose<C>> {
     let length = mech.legs.iter().map(|leg| leg::position(leg, &mech.home).length).fold(0.0, f64::max);
     let home = Pose::lift(&mech.home);
-    let mut pose = Pose {
-        rotation: Mat3::cayley(draw.vector(Draw::complex) * C::lit(1.5)) * home.rotation,
-        o: home.o + draw.vector(Draw::complex) * C::lit(length),
+    let rotation = Mat3::cayley(draw.vector(Draw::complex) * C::lit(1.5)) * home.rotation;
+    let aside = draw.vector(Draw::complex) * C::lit(length);
+    let middle = |point: fn(&Leg) -> Vec3<f64>| {
+        let sum = mech.legs.iter().map(point).fold(Vec3::zero(), |sum, p| sum + p);
+        Vec3::lift(sum * (1.0 / count(mech.legs.len())))
     };
+    let o = if in_the_middle {
+        middle(|leg| leg.base.point) - rotation * middle(|leg| leg.platform.point) + aside * C::lit(MIDDLE)
+    } else {
+        home.o + aside
+    };
+    let mut pose = Pose { rotation, o };
     let free: [[C; 6]; 6] = std::array::from_fn(|_| std::array::from_fn(|_| draw.complex()));
     let dof = mech.dof();
     for _ in 0..30 {
