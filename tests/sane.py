@@ -43,11 +43,15 @@ KEYS: dict[tuple[str, ...], set[str]] = {
     ("rods", "point"): POINT,
     ("rods", "axis"): AXIS,
     ("rods", "range"): ENDS,
-    ("legs",): {"name", "actuated", "stroke", "radius", "force", "base", "platform", "cylinder", "piston"},
+    ("legs",): {"name", "actuated", "stroke", "radius", "force", "base", "platform", "cylinder", "piston"}
+    | {"slider", "carriage", "strut"},
+    ("legs", "slider"): {"axis", "strut", "branch"},
+    ("legs", "slider", "axis"): AXIS,
+    ("legs", "carriage"): {"mass", "center"},
     ("legs", "stroke"): ENDS,
     ("legs", "force"): ENDS,
 }
-for link in ("cylinder", "piston"):
+for link in ("cylinder", "piston", "strut"):
     KEYS["legs", link] = BODY
 for side in ("base", "platform"):
     KEYS |= {("legs", side): JOINT, ("legs", side, "point"): POINT, ("legs", side, "range"): ENDS}
@@ -127,17 +131,28 @@ def expected(data: Tables) -> Tables:
             "range": ends(value.get("range"), "angle"),
         }
 
+    def slider(value: Any, carriage: Any) -> Any:
+        if value is None:
+            return None
+        if carriage is not None:
+            center = si(carriage.get("center", [0.0, 0.0, 0.0]), "length")
+            carriage = {"mass": si(carriage["mass"], "mass"), "center": center}
+        rail = {"axis": axis(value["axis"]), "strut": si(value["strut"], "length")}
+        return rail | {"branch": value["branch"], "carriage": carriage}
+
     def leg(number: int, value: Any) -> Tables:
+        upper = "piston" if value.get("slider") is None else "strut"
         return {
             "name": str(number) if value.get("name") is None else value["name"],
             "actuated": value.get("actuated", True),
+            "slider": slider(value.get("slider"), value.get("carriage")),
             "stroke": ends(value.get("stroke"), "length"),
             "radius": si(value.get("radius"), "length"),
             "force": ends(value.get("force"), "force"),
             "base": joint(value["base"]),
             "platform": joint(value["platform"]),
             "cylinder": body(value.get("cylinder"), +1.0),
-            "piston": body(value.get("piston"), -1.0),
+            "piston": body(value.get(upper), -1.0),
         }
 
     def rod(value: Any) -> Tables:
@@ -243,7 +258,8 @@ def nonsense(mech: pp.Mechanism, data: Tables) -> list[str]:
     wrong += [f"not as in the file: {place}" for place in different(mech.geometry, facts)]
     wrong += _bodies(facts) + _ranges(facts) + _home(mech, facts) + _answers(mech)
     mobility = mech.mobility()
-    if not (mech.dof == mobility.dof == int(mech.actuated.sum()) and 1 <= mech.dof <= 6):
+    felt = mech.dof - len(mobility.idle)
+    if not (mech.dof == mobility.dof and felt <= int(mech.actuated.sum()) and 1 <= mech.dof <= 6):
         wrong.append(f"{mech.dof} freedoms, {mech.actuated.sum()} actuators")
     if len(set(mech.leg_names)) < mech.n_legs or not all(mech.leg_names) or not mech.name.strip():
         wrong.append(f"names {mech.name!r} {mech.leg_names}")
@@ -285,8 +301,12 @@ def _ranges(facts: Tables) -> list[str]:
     wrong += [
         f"stroke {leg['stroke']}"
         for leg in facts["legs"]
-        if leg["stroke"] is not None and leg["stroke"][0] < 0
+        if leg["stroke"] is not None and leg["stroke"][0] < 0 and leg["slider"] is None
     ]
+    rails = [leg["slider"] for leg in facts["legs"] if leg["slider"] is not None]
+    wrong += [f"rail {rail}" for rail in rails if not (rail["strut"] > 0.0 and abs(rail["branch"]) == 1.0)]
+    masses = [rail["carriage"]["mass"] for rail in rails if rail["carriage"] is not None]
+    wrong += [f"carriage of {mass} kg" for mass in masses if not mass > 0.0]
     if not (
         0.0 < facts["efficiency"] <= 1.0
         and facts["linear_damping"] >= 0.0
@@ -305,6 +325,11 @@ def _home(mech: pp.Mechanism, facts: Tables) -> list[str]:
     ends = [(leg["base"]["point"], o + turn @ leg["platform"]["point"]) for leg in facts["legs"]]
     vectors = np.array([b - a for a, b in ends])
     lengths = np.linalg.norm(vectors, axis=1)
+    coordinates = lengths.copy()
+    for i, leg in enumerate(facts["legs"]):
+        if leg["slider"] is not None:
+            coordinates[i], vectors[i] = on_rail(leg["slider"], vectors[i])
+            lengths[i] = leg["slider"]["strut"]
     found = mech.inverse_kinematics(mech.home)
     if int(found.status) not in (Status.OK, *BEYOND_LIMITS):
         wrong.append(f"home has status {Status(int(found.status)).name}")
@@ -312,12 +337,25 @@ def _home(mech: pp.Mechanism, facts: Tables) -> list[str]:
         wrong.append("home is beyond a limit without a warning")
     if not (np.isfinite(size) and size > 0.0 and (lengths > 1e-9 * size).all()):
         wrong.append(f"lengths {lengths} of size {size}")
-    if not abs(found.lengths - lengths).max() <= 1e-12 * (abs(np.array(ends)).max() + abs(o).max()):
-        wrong.append(f"lengths {found.lengths} for {lengths}")
+    # Where a strut is nearly square to its rail the place goes by a root.
+    slack = 1e-12 if all(leg["slider"] is None for leg in facts["legs"]) else 1e-8
+    if not abs(found.lengths - coordinates).max() <= slack * (abs(np.array(ends)).max() + abs(o).max()):
+        wrong.append(f"lengths {found.lengths} for {coordinates}")
     rods = facts["rods"]
     for leg, vector, length in zip(facts["legs"], vectors, lengths, strict=True):
         wrong += _joints(leg, vector / length, turn, rods)
     return wrong
+
+
+def on_rail(slider: Tables, vector: np.ndarray) -> tuple[float, np.ndarray]:
+    """Where on its rail the carriage is, and the strut: of two places the one on the side of the branch."""
+    axis = np.asarray(slider["axis"], dtype=float)
+    axis = axis / np.linalg.norm(axis)
+    along = float(axis @ vector)
+    half = np.sqrt(along**2 - (vector @ vector - slider["strut"] ** 2))
+    roots = [along - half, along + half]
+    place = next(q for q in roots if (vector - q * axis) @ axis * slider["branch"] >= 0.0)
+    return place, vector - place * axis
 
 
 def _joints(leg: Tables, along: np.ndarray, turn: np.ndarray, rods: list[Tables]) -> list[str]:

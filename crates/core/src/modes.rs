@@ -281,10 +281,10 @@ fn at_home(mech: &Mechanism, leg: &Leg) -> Asked<C> {
 /// Complex squares of lengths that are off those at home by about `reach` times as much, and places of carriages by as
 /// many struts as that makes of lengths.
 fn generic(mech: &Mechanism, reach: f64, draw: &mut Draw) -> [Asked<C>; 6] {
-    let mut asked = [Asked::none(); 6];
-    for (asked, (_, leg)) in asked.iter_mut().zip(mech.actuated()) {
+    let (mut asked, drawn) = ([Asked::none(); 6], [(); 6].map(|()| draw.complex().scale(reach)));
+    for ((asked, (_, leg)), drawn) in asked.iter_mut().zip(mech.actuated()).zip(drawn) {
         let Asked { place, square } = at_home(mech, leg);
-        *asked = Asked { place, square: square * (C::lit(1.0) + draw.complex().scale(reach)) };
+        *asked = Asked { place, square: square * (C::lit(1.0) + drawn) };
         if let Drive::Slider { strut, .. } = leg.drive {
             asked.place = place + draw.complex().scale(strut * reach.min(reach.sqrt()));
         }
