@@ -99,7 +99,7 @@ def shaky(drawn: Drawn) -> list[str]:
 
 def refusal(error: pp.MechanismError, own: Mobility, actuators: int) -> tuple[str, list[str]]:
     """The reason without its numbers, and what is wrong with it."""
-    [fault] = error.faults
+    fault, *others = error.faults
     reason = re.sub(r"\d+", "n", fault.message.split(";")[0])
     said = re.match(r"(\d+) actuated legs for (\d+) freedoms; (at least|redundant)", fault.message)
     if said:
@@ -107,7 +107,9 @@ def refusal(error: pp.MechanismError, own: Mobility, actuators: int) -> tuple[st
         right = (int(said[1]), int(said[2])) == (actuators, own.dof) and few == (actuators < own.dof)
     else:
         right = "leave the platform no freedom" in fault.message and own.dof == 0
-    return reason, [] if right else [f"refused: {fault}; by screws {own}, {actuators} actuators"]
+    return reason, [] if right and not others else [
+        f"refused: {fault}; by screws {own}, {actuators} actuators"
+    ]
 
 
 def kinematics(mech: pp.Mechanism, drawn: Drawn, out: Outcome) -> None:
