@@ -248,8 +248,16 @@ BEYOND_LIMITS = (Status.OUT_OF_STROKE, Status.OUT_OF_CONE, Status.OUT_OF_ANGLE)
 """Said of the home pose by its status and by a warning: numbers stand."""
 
 
+def present(value: Any) -> Any:
+    """Without entries that are None, which a dictionary may have in place of no entry."""
+    if isinstance(value, dict):
+        return {key: present(entry) for key, entry in value.items() if entry is not None}
+    return [present(entry) for entry in value] if isinstance(value, list) else value
+
+
 def nonsense(mech: pp.Mechanism, data: Tables) -> list[str]:
     """What is wrong with a mechanism that was loaded from `data`."""
+    data = present(data)
     wrong = [f"unknown key {key}" for key in unknown_keys(data)]
     wrong += [f"number {n} in the file" for n in numbers(data) if not math.isfinite(n)]
     if wrong:
@@ -409,7 +417,8 @@ def _answers(mech: pp.Mechanism) -> list[str]:
         wrong.append(f"singular values {sigma.sigma_min} {sigma.sigma_max}")
     if status in (Status.OK, *BEYOND_LIMITS):
         wrong += [] if np.isfinite(found.forces).all() else ["forces are no numbers"]
-        if sigma.sigma_min < 1e-15 * sigma.sigma_max:
+        # Next to a singular pose there are forces; a warning then says so.
+        if sigma.sigma_min < 1e-15 * sigma.sigma_max and not any("singular at" in n for n in mech.warnings):
             wrong.append(f"forces where the least singular value is {sigma.sigma_min}")
     elif status is not Status.SINGULAR:
         wrong.append(f"inverse dynamics at home has status {status.name}")
@@ -457,6 +466,7 @@ def vague(error: pp.MechanismError, content: bytes | str | Tables) -> list[str]:
 def _vague(
     fault: Any, lines: list[str], data: Tables | None, known: dict[str, tuple[Any, ...]]
 ) -> Iterator[str]:
+    texts = any(quote in text for quote in ("'''", '"""') for text in lines)
     message, line = fault.message, lines[fault.line - 1] if 1 <= (fault.line or 0) <= len(lines) else None
     if not message.strip() or not message.isprintable() or "Traceback" in message or "pydantic" in message:
         yield "no message"
@@ -485,8 +495,8 @@ def _vague(
         yield "no line"
     elif last not in line and json.dumps(last)[1:-1] not in line and not line.endswith("["):
         yield f"line {fault.line} says {line!r}"
-    elif (number := re.match(rf"{top}\.(\d+)", fault.place)) and f"[[{top}]]" in lines:
-        # The one table among those of its array.
+    elif (number := re.match(rf"{top}\.(\d+)", fault.place)) and f"[[{top}]]" in lines and not texts:
+        # The one table among those of its array; texts of several lines may hold what looks like one.
         before = lines[: fault.line].count(f"[[{top}]]")
         if before != int(number[1]):
             yield f"line {fault.line} is in {top}.{before}"

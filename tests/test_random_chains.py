@@ -70,10 +70,12 @@ def examine(number: int) -> Outcome:
     except pp.MechanismError as error:
         out.refused, out.wrong = refusal(error, own, actuators)
         return out
-    if own.dof != actuators:
-        out.wrong.append(f"loaded with {actuators} actuators for {own.dof} freedoms")
     found = mech.mobility()
-    theirs = Mobility(found.dof, found.passive, found.closure_rank, found.uncontrolled)
+    if actuators < own.dof - len(found.idle):
+        out.wrong.append(f"loaded with {actuators} actuators for {own.dof} freedoms, {found.idle}")
+    # What actuators do not hold, by screws: idle freedoms too.
+    left = found.uncontrolled + len(found.idle)
+    theirs = Mobility(found.dof, found.passive, found.closure_rank, left)
     if theirs != own:
         out.wrong.append(f"mobility {theirs}, by screws {own}")
     if found.redundant != 6 * (len(drawn.legs) - 1) - own.closure_rank or found.joint_freedoms != sum(
@@ -99,15 +101,17 @@ def shaky(drawn: Drawn) -> list[str]:
 
 def refusal(error: pp.MechanismError, own: Mobility, actuators: int) -> tuple[str, list[str]]:
     """The reason without its numbers, and what is wrong with it."""
-    [fault] = error.faults
+    fault, *others = error.faults
     reason = re.sub(r"\d+", "n", fault.message.split(";")[0])
-    said = re.match(r"(\d+) actuated legs for (\d+) freedoms; (at least|redundant)", fault.message)
+    said = re.match(r"(\d+) actuated legs for (\d+) freedoms.*; at least (\d+) legs", fault.message)
     if said:
-        few = said[3] == "at least"
-        right = (int(said[1]), int(said[2])) == (actuators, own.dof) and few == (actuators < own.dof)
+        # Fewer are needed where freedoms are idle.
+        right = (int(said[1]), int(said[2])) == (actuators, own.dof) and actuators < int(said[3]) <= own.dof
     else:
         right = "leave the platform no freedom" in fault.message and own.dof == 0
-    return reason, [] if right else [f"refused: {fault}; by screws {own}, {actuators} actuators"]
+    return reason, [] if right and not others else [
+        f"refused: {fault}; by screws {own}, {actuators} actuators"
+    ]
 
 
 def kinematics(mech: pp.Mechanism, drawn: Drawn, out: Outcome) -> None:

@@ -251,6 +251,8 @@ LARGEST = {
 }
 """Of each kind in SI: beyond that a number is a slip, in its unit or its digits."""
 
+LEAST_EFFICIENCY = 1e-3
+
 _Quantity = tuple[tuple[str | int, ...], str, float]
 
 # --- from the file to SI ------------------------------------------------------------------------------------
@@ -272,6 +274,9 @@ def read_spec(data: dict[str, Any]) -> tuple[dict[str, Any], list[Fault]]:
 
     head = read_table(Header, header, "", faults)
     dynamics = read_table(Dynamics, data.get("dynamics", {}), "dynamics", faults) or Dynamics()
+    if 0.0 < dynamics.efficiency < LEAST_EFFICIENCY:
+        message = f"is {dynamics.efficiency}; less than {LEAST_EFFICIENCY} makes forces without bound"
+        faults.append(Fault("dynamics.efficiency", message))
     load = read_table(Load, data.get("load", {}), "load", faults) or Load()
     tool = read_table(Tool, data.get("tool", {}), "tool", faults) or Tool()
     limits = read_table(Limits, data.get("limits", {}), "limits", faults) or Limits()

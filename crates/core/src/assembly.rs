@@ -294,14 +294,15 @@ fn strut_at_home(slider: &SliderSpec, r: Vec3<f64>) -> Result<Vec3<f64>, String>
 fn check_slider(place: &str, leg: &LegSpec, slider: &SliderSpec) -> Vec<Fault> {
     let mut faults = Vec::new();
     let axis = slider.axis.unit();
-    let own = leg.base.axis.map_or(axis, Vec3::unit);
+    let square = leg.base.axis.is_none_or(|own| own.unit().dot(axis).abs() <= ANGLE_TOLERANCE);
+    let along = leg.base.axis.is_none_or(|own| own.unit().cross(axis).norm() <= ANGLE_TOLERANCE);
     if leg.base.rod.is_some() {
         faults.push(Fault::new(format!("{place}.base.rod"), "a rod carries telescopic legs only"));
         return faults;
     }
     let (above, below) = (leg.platform.joint, leg.base.joint);
     match below {
-        JointKind::Revolute if own.dot(axis).abs() > ANGLE_TOLERANCE => {
+        JointKind::Revolute if !square => {
             faults.push(Fault::new(
                 format!("{place}.base.axis"),
                 "must be square to the rail: R on a carriage",
@@ -311,7 +312,7 @@ fn check_slider(place: &str, leg: &LegSpec, slider: &SliderSpec) -> Vec<Fault> {
             let message = "is F; the strut must turn on its carriage: give S, U or R";
             faults.push(Fault::new(format!("{place}.base.joint"), message));
         }
-        JointKind::Universal if above == JointKind::Universal && own.cross(axis).norm() > ANGLE_TOLERANCE => {
+        JointKind::Universal if above == JointKind::Universal && !along => {
             let message = "must lie along the rail: U on a carriage, with U on the platform";
             faults.push(Fault::new(format!("{place}.base.axis"), message));
         }

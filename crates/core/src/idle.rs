@@ -217,18 +217,18 @@ fn line(mech: &Mechanism, side: Side, turn: &Twist<f64>) -> Idle {
     varied(&Idle { through, ..idle }, &mech.legs)
 }
 
-/// Whether a turn is no sum of those found, at a pose.
+/// Whether a turn is no sum of those found, at a pose, and has a row (0, u) of its own beside theirs: there are three at most.
 fn is_new(mech: &Mechanism, found: &[Idle], idle: &Idle, pose: &Pose<f64>) -> bool {
-    let rows: Vec<[f64; 6]> = found
-        .iter()
-        .chain([idle])
-        .map(|idle| {
-            let Twist { v, omega } = twist(idle, pose);
-            Twist::new(v * (1.0 / mech.characteristic_length), omega).array()
-        })
-        .collect();
-    let svd = Svd::of(&DMatrix::from_fn(6, rows.len(), |i, j| rows[j][i]));
-    svd.is_some_and(|svd| svd.rank(FIXED) == rows.len())
+    let all = || found.iter().chain([idle]);
+    let twists = all().map(|idle| {
+        let Twist { v, omega } = twist(idle, pose);
+        Twist::new(v * (1.0 / mech.characteristic_length), omega).array()
+    });
+    let independent = |rows: Vec<[f64; 6]>| {
+        let svd = Svd::of(&DMatrix::from_fn(6, rows.len(), |i, j| rows[j][i]));
+        svd.is_some_and(|svd| svd.rank(FIXED) == rows.len())
+    };
+    independent(twists.collect()) && independent(all().map(|idle| row(idle, pose).array()).collect())
 }
 
 #[cfg(test)]

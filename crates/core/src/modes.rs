@@ -190,12 +190,13 @@ pub fn start(mech: &Mechanism) -> Option<Start> {
     let mut result =
         Start { asked, poses: Vec::new(), own_images: Vec::new(), mirror: Mirror::of(mech), square: None };
     // Every component of the set of complex poses has its own solutions: random poses reach each of them.
-    for i in 0..SEEDS + SEEDS_IN_THE_MIDDLE {
-        if let Some(pose) = random_pose(mech, &mut draw, i >= SEEDS) {
-            let path = Path { mech, from: asked_at(mech, &pose), to: asked, precision: CLOSE };
-            for pose in path.follow(&[pose]).into_iter().filter_map(End::regular) {
-                result.extend(mech, pose);
-            }
+    let mut other = Draw(0xD1B5_4A32_D192_ED03);
+    let mut seeds: Vec<_> = (0..SEEDS).filter_map(|_| random_pose(mech, &mut draw, false)).collect();
+    seeds.extend((0..SEEDS_IN_THE_MIDDLE).filter_map(|_| random_pose(mech, &mut other, true)));
+    for pose in seeds {
+        let path = Path { mech, from: asked_at(mech, &pose), to: asked, precision: CLOSE };
+        for pose in path.follow(&[pose]).into_iter().filter_map(End::regular) {
+            result.extend(mech, pose);
         }
     }
     // Loops of lengths permute the solutions; one that finds nothing new leaves the known ones among themselves.
