@@ -51,7 +51,7 @@ def without_masses():
 def nasty():
     """The paper's mechanism with names that no format takes."""
     tables = pp.load(LU).to_dict()
-    tables["name"] = "--> </robot> \x07 Müller's \N{ROBOT FACE}"
+    tables["name"] = "--> </robot> Müller's \N{ROBOT FACE}"
     tables["rods"][0]["name"] = "L/1"
     for leg in tables["legs"]:
         leg["name"] = NASTY[leg["name"]]

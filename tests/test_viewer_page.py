@@ -277,7 +277,7 @@ def test_a_length_without_a_pose_is_refused_in_words(page, viewer, screenshots):
     lengths = viewer.model.view().lengths
     field = type_into(page, "4 / mm", 852)
     status = page.locator("[data-polypod='status']")
-    page.get_by_text("Leg 4 cannot be 852.0 mm long").wait_for()
+    page.get_by_text("The length of leg 4 cannot be 852.0 mm").wait_for()
     assert "The last good pose stays." in status.inner_text()
     assert status.get_attribute("data-level") == "BEYOND"
     wait_for(lambda: float(field.input_value()) == pytest.approx(1e3 * lengths[3], abs=0.051))
@@ -286,7 +286,7 @@ def test_a_length_without_a_pose_is_refused_in_words(page, viewer, screenshots):
     picture(page, screenshots, "viewer-refused")
     type_into(page, "4 / mm", 757)
     wait_for_number(page, "length 4", 757.0)
-    page.get_by_text("Leg 4 cannot be").wait_for(state="detached")
+    page.get_by_text("The length of leg 4 cannot be").wait_for(state="detached")
 
 
 def test_workspace_and_modes_are_shown(page, viewer, mech, screenshots):

@@ -11,6 +11,8 @@ from dataclasses import dataclass
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
 _LONGEST_SHOWN = 80
 """Characters of a value in a message."""
+_LONGEST_PATH = 1000
+"""Of a name that may be a path."""
 
 
 class PolypodError(Exception):
@@ -111,7 +113,8 @@ class UnknownNameError(PolypodError):
         super().__init__(kind, name, self.valid)
 
     def __str__(self) -> str:
-        return f"there is no {self.kind} {shown(self.name)}; {alternatives(self.name, self.valid)}"
+        name = shown(self.name, _LONGEST_PATH)
+        return f"there is no {self.kind} {name}; {alternatives(self.name, self.valid)}"
 
 
 def alternatives(name: str, valid: Iterable[str]) -> str:
@@ -122,7 +125,7 @@ def alternatives(name: str, valid: Iterable[str]) -> str:
     return f"{hint}valid: {', '.join(names) or 'none'}"
 
 
-def shown(value: object) -> str:
+def shown(value: object, longest: int = _LONGEST_SHOWN) -> str:
     """A value as a file writes it, the beginning of a long one; a table is only called one."""
     if isinstance(value, dict):
         return "a table"
@@ -131,7 +134,7 @@ def shown(value: object) -> str:
     except (RecursionError, ValueError):  # too deep, or with too many digits
         return "a value that is too long to be shown"
     text = text if text.isprintable() else json.dumps(value, default=str)
-    return text if len(text) <= _LONGEST_SHOWN else f"{text[: _LONGEST_SHOWN - 4]} ..."
+    return text if len(text) <= longest else f"{text[: longest - 4]} ..."
 
 
 def place_of(*parts: str | int) -> str:
