@@ -891,7 +891,7 @@ def test_legs_on_one_rod_keep_the_angle_between_their_planes():
     """Legs whose planes through their rod differ are tied by it: one freedom less than two UPU legs leave.
 
     The rod carries both revolute joints, so that the angle between their axes stays. Where both platform axes
-    lie on one line, as in the paper, the angle stays anyway; elsewhere four actuators are one more than needed.
+    lie on one line, as in the paper, the angle stays anyway; elsewhere one of four actuators is redundant.
     """
     rng = np.random.default_rng(SEED)
     tables = draw("rod-of-two", ["UPS", "rRPU", "SPU", "rRPU"], rng)
