@@ -9,6 +9,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from polypod.mechanism import Mechanism
+from polypod.schema import SLIDER_LINKS, TELESCOPE_LINKS
 
 Array = NDArray[np.float64]
 
@@ -20,7 +21,7 @@ def slides(letters: str) -> bool:
 
 def links_of_leg(letters: str) -> tuple[str, str]:
     """What the two links of a leg are called, from the base on."""
-    return ("carriage", "strut") if slides(letters) else ("cylinder", "piston")
+    return SLIDER_LINKS if slides(letters) else TELESCOPE_LINKS
 
 
 def word(letters: Iterable[str]) -> str:

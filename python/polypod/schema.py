@@ -226,6 +226,11 @@ class Leg(Table):
     strut: Link | None = None
 
 
+TELESCOPE_LINKS = ("cylinder", "piston")
+SLIDER_LINKS = ("carriage", "strut")
+"""The two links of a leg, from the base on."""
+
+
 class Limits(Table):
     """Limits of the mechanism as a whole."""
 
@@ -392,11 +397,12 @@ def _leg(
         return None
     if leg.slider is None and isinstance(data, dict) and "slider" in data:
         return None  # its faults are known, and which links it may have is not
-    for key in _LINKS_OF[leg.slider is None]:
+    own, others, of = SLIDER_LINKS, TELESCOPE_LINKS, "a slider"
+    if leg.slider is None:
+        own, others, of = TELESCOPE_LINKS, SLIDER_LINKS, "a telescopic leg (one without slider)"
+    for key in others:
         if getattr(leg, key) is not None:
-            of = "a telescopic leg (one without slider)" if leg.slider is None else "a slider"
-            own = " and ".join(_LINKS_OF[leg.slider is not None])
-            faults.append(Fault(f"{place}.{key}", f"must not be given; {of} has {own}"))
+            faults.append(Fault(f"{place}.{key}", f"must not be given; {of} has {' and '.join(own)}"))
     base = _joint(leg.base, f"{place}.base", rod_names, units, faults)
     platform = _joint(leg.platform, f"{place}.platform", None, units, faults)
     if base is None or platform is None:
@@ -414,10 +420,6 @@ def _leg(
         "cylinder": leg.cylinder and _link(leg.cylinder, +1, units),
         "piston": above and _link(above, -1, units),
     }
-
-
-_LINKS_OF = {True: ("carriage", "strut"), False: ("cylinder", "piston")}
-"""What a leg has not, by whether it is telescopic."""
 
 
 def _slider(slider: Slider, carriage: Carriage | None, units: Units) -> dict[str, Any]:

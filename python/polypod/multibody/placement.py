@@ -13,6 +13,8 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from polypod.schema import SLIDER_LINKS, TELESCOPE_LINKS
+
 Array = NDArray[np.float64]
 Placements = dict[str, Array]
 """Frame (4, 4) of each body in base axes, by the body's name."""
@@ -37,7 +39,7 @@ class Turning:
 
 def leg_bodies(leg: Mapping[str, Any]) -> tuple[str, str]:
     """Names of a leg's two links, from the base on: cylinder and piston, or carriage and strut."""
-    first, second = ("cylinder", "piston") if leg["slider"] is None else ("carriage", "strut")
+    first, second = TELESCOPE_LINKS if leg["slider"] is None else SLIDER_LINKS
     return f"leg {leg['name']} {first}", f"leg {leg['name']} {second}"
 
 
