@@ -52,6 +52,7 @@ pub mod spatial;
 pub mod spec;
 pub mod status;
 mod streaming;
+mod study;
 mod svd;
 pub mod threads;
 pub mod trig;

@@ -1,4 +1,4 @@
-//! Paths of complex solutions as squared leg lengths, or places of carriages, change, several side by side \[T29\].
+//! Paths of complex solutions as equations change, such as squared leg lengths, several side by side \[T29\].
 
 use crate::complex::Complex;
 use crate::forward::{Asked, FOLD_PIVOTS, System, system};
@@ -63,12 +63,61 @@ impl End {
     }
 }
 
-/// A straight path of what is asked of the legs from t = 0 to t = 1.
+/// Six equations that change from t = 0 to t = 1.
+pub trait Family {
+    fn mech(&self) -> &Mechanism;
+
+    /// Whether solutions that differ by an idle spin are one \[T71\].
+    fn spins(&self) -> bool;
+
+    /// The equations at a place, and the rates at which their residuals fall there. Must be `#[inline(always)]`.
+    fn at<V: Lanes>(&self, place: &Place<Complex<V>>, t: V) -> (System<Complex<V>>, [Complex<V>; 6]);
+}
+
+/// What is asked of the legs along a straight path.
 #[derive(Clone, Copy, Debug)]
-pub struct Path<'a> {
+pub struct Lengths<'a> {
     pub mech: &'a Mechanism,
     pub from: [Asked<C>; 6],
     pub to: [Asked<C>; 6],
+}
+
+impl Family for Lengths<'_> {
+    fn mech(&self) -> &Mechanism {
+        self.mech
+    }
+
+    fn spins(&self) -> bool {
+        !self.mech.idle.is_empty()
+    }
+
+    #[inline(always)]
+    fn at<V: Lanes>(&self, place: &Place<Complex<V>>, t: V) -> (System<Complex<V>>, [Complex<V>; 6]) {
+        let Lengths { mech, from, to } = self;
+        let unit = 1.0 / (mech.characteristic_length * mech.characteristic_length);
+        let pose = place.pose();
+        let mut asked = [Asked::none(); 6];
+        let mut rates = [Complex::<V>::zero(); 6];
+        let mut i = 0;
+        for leg in &mech.legs {
+            if leg.actuated {
+                let (square, square_rate) = between(from[i].square, to[i].square, t);
+                let (place, place_rate) = between(from[i].place, to[i].place, t);
+                asked[i] = Asked { place, square };
+                let rate = Asked { place: place_rate, square: square_rate };
+                let r = asked[i].vector(leg, leg::vectors(leg, &pose).1);
+                rates[i] = Asked::change(leg, r, &rate).scale(unit);
+                i += 1;
+            }
+        }
+        (system(mech, &pose, &asked), rates)
+    }
+}
+
+/// The paths of the solutions of such equations.
+#[derive(Clone, Copy, Debug)]
+pub struct Path<F> {
+    pub family: F,
     /// Error of a predicted step, as a pure number.
     pub precision: f64,
 }
@@ -128,7 +177,7 @@ impl Traveller {
     }
 }
 
-impl Path<'_> {
+impl<F: Family> Path<F> {
     /// Follows the path from solutions at t = 0 by the classical Runge-Kutta method and Newton corrections.
     #[must_use]
     pub fn follow(&self, starts: &[Pose<C>]) -> Vec<End> {
@@ -144,7 +193,7 @@ impl Path<'_> {
             {
                 if let Some((start, pose)) = waiting.next() {
                     *traveller = Some(Traveller::new(start));
-                    Place::of(pose).unspun(self.mech).put(&mut place, k);
+                    self.unspun(Place::of(pose)).put(&mut place, k);
                 }
             }
             if travellers.iter().all(Option::is_none) {
@@ -184,16 +233,20 @@ impl Path<'_> {
                     copy(&next, &mut place, k);
                 }
                 let here = Place::get(&place, k);
-                if !self.mech.idle.is_empty() {
-                    here.unspun(self.mech).put(&mut place, k);
+                if self.family.spins() {
+                    self.unspun(here).put(&mut place, k);
                 }
-                if !(here.size(self.mech) < INFINITE) {
+                if !(here.size(self.family.mech()) < INFINITE) {
                     (ends[who.start], *traveller) = (End::Infinite, None);
                 } else if who.t < 1.0 && who.h <= SMALLEST_STEP {
                     (ends[who.start], *traveller) = (self.end(who, &here), None);
                 }
             }
         }
+    }
+
+    fn unspun(&self, place: Place<C>) -> Place<C> {
+        if self.family.spins() { place.unspun(self.family.mech()) } else { place }
     }
 
     /// The classical Runge-Kutta step.
@@ -216,44 +269,45 @@ impl Path<'_> {
 
     /// What the path comes to where it cannot be followed further, or paths seem to meet.
     fn end(&self, who: &Traveller, place: &Place<C>) -> End {
-        let size = place.size(self.mech);
+        let mech = self.family.mech();
+        let size = place.size(mech);
         if who.t < 1.0 - NEAR_END {
             return if size > FAR { End::Infinite } else { End::Lost };
         }
         let (mut place, mut last) = (*place, f64::NAN);
         for _ in 0..LAST_STEPS {
-            let System { residual, matrix } = system(self.mech, &place.pose(), &self.to);
+            let (System { residual, matrix }, _) = self.family.at(&place, 1.0);
             let step = solve(matrix, residual.map(|f| -f)).x;
-            place = place + place.along(self.mech, &step);
-            last = step_size(self.mech, &place, &step);
+            place = place + place.along(mech, &step);
+            last = step_size(mech, &place, &step);
             if !(last > ROUNDING) {
                 break;
             }
         }
         // Where paths meet, Newton steps may be small by chance: the matrix tells.
-        let pose = place.pose();
-        let System { residual, matrix } = system(self.mech, &pose, &self.to);
+        let (System { residual, matrix }, _) = self.family.at(&place, 1.0);
         let determined = size > NEARBY || solve(matrix, residual).pivots > FOLD_PIVOTS;
         let regular = who.t >= 1.0 && last <= CONVERGED && determined;
-        if regular { End::Regular(pose) } else { End::Singular(pose) }
+        if regular { End::Regular(place.pose()) } else { End::Singular(place.pose()) }
     }
 
     /// Newton steps and rates at places.
     fn evaluate(&self, place: &Block, t: &Row, result: &mut Evaluated) {
-        lanes::dispatch(Evaluation { path: self, place, t, result });
+        lanes::dispatch(Evaluation { family: &self.family, place, t, result });
     }
 }
 
 /// A complex pose with its rotation as a quaternion of any size but zero, so that steps are sums \[T29\].
 #[derive(Clone, Copy, Debug)]
-struct Place<T> {
-    q: [T; 4],
-    o: Vec3<T>,
+pub struct Place<T> {
+    pub q: [T; 4],
+    pub o: Vec3<T>,
 }
 
 impl<T: Real> Place<T> {
+    #[must_use]
     #[inline(always)]
-    fn pose(&self) -> Pose<T> {
+    pub fn pose(&self) -> Pose<T> {
         let [w, x, y, z] = self.q;
         let share = T::lit(2.0) / (w * w + x * x + y * y + z * z);
         let (sx, sy, sz) = (x * share, y * share, z * share);
@@ -271,7 +325,7 @@ impl<T: Real> Place<T> {
 
     /// The change of the place along (v/Λ, ω): `q' = ω q/2`.
     #[inline(always)]
-    fn along(&self, mech: &Mechanism, x: &[T; 6]) -> Self {
+    pub(crate) fn along(&self, mech: &Mechanism, x: &[T; 6]) -> Self {
         let [w, i, j, k] = self.q;
         let (omega, vector) = (Vec3::new(x[3], x[4], x[5]).scale(0.5), Vec3::new(i, j, k));
         let turned = omega * w + omega.cross(vector);
@@ -289,7 +343,7 @@ impl<T: Real> std::ops::Add for Place<T> {
 
 impl Place<C> {
     /// From the largest of four products of the quaternion with each of its parts.
-    fn of(pose: &Pose<C>) -> Self {
+    pub(crate) fn of(pose: &Pose<C>) -> Self {
         let m = pose.rotation.rows();
         let one = C::one();
         let (w, x) = (one + m[0][0] + m[1][1] + m[2][2], one + m[0][0] - m[1][1] - m[2][2]);
@@ -412,38 +466,21 @@ struct Evaluated {
     rate: Block,
 }
 
-struct Evaluation<'a> {
-    path: &'a Path<'a>,
+struct Evaluation<'a, F> {
+    family: &'a F,
     place: &'a Block,
     t: &'a Row,
     result: &'a mut Evaluated,
 }
 
-impl Task for Evaluation<'_> {
+impl<F: Family> Task for Evaluation<'_, F> {
     #[inline(always)]
     fn run<V: Lanes>(self) {
-        let Path { mech, from, to, .. } = self.path;
-        let unit = 1.0 / (mech.characteristic_length * mech.characteristic_length);
+        let mech = self.family.mech();
         let mut k = 0;
         while k < WIDTH {
             let place: Place<Complex<V>> = load(self.place, k);
-            let t = V::load(&self.t[k..]);
-            let pose = place.pose();
-            let mut asked = [Asked::none(); 6];
-            let mut rates = [Complex::<V>::zero(); 6];
-            let mut i = 0;
-            for leg in &mech.legs {
-                if leg.actuated {
-                    let (square, square_rate) = between(from[i].square, to[i].square, t);
-                    let (place, place_rate) = between(from[i].place, to[i].place, t);
-                    asked[i] = Asked { place, square };
-                    let rate = Asked { place: place_rate, square: square_rate };
-                    let r = asked[i].vector(leg, leg::vectors(leg, &pose).1);
-                    rates[i] = Asked::change(leg, r, &rate).scale(unit);
-                    i += 1;
-                }
-            }
-            let System { mut residual, matrix } = system(mech, &pose, &asked);
+            let (System { mut residual, matrix }, rates) = self.family.at(&place, V::load(&self.t[k..]));
             for f in &mut residual {
                 *f = -*f;
             }
@@ -499,7 +536,7 @@ mod tests {
 
     #[derive(Clone, Copy)]
     struct Each<'a> {
-        path: &'a Path<'a>,
+        family: &'a Lengths<'a>,
         place: &'a Block,
         t: &'a Row,
         results: &'a RefCell<Vec<(bool, Evaluated)>>,
@@ -509,7 +546,7 @@ mod tests {
         #[inline(always)]
         fn run<V: Lanes>(self) {
             let mut result = Evaluated::default();
-            Evaluation { path: self.path, place: self.place, t: self.t, result: &mut result }.run::<V>();
+            Evaluation { family: self.family, place: self.place, t: self.t, result: &mut result }.run::<V>();
             self.results.borrow_mut().push((V::FUSED, result));
         }
     }
@@ -526,14 +563,14 @@ mod tests {
         for mech in common::mechanisms() {
             let [from, to] = [(); 2]
                 .map(|()| std::array::from_fn(|_| Asked { place: draw.complex(), square: draw.complex() }));
-            let path = Path { mech: &mech, from, to, precision: 1e-3 };
+            let family = Lengths { mech: &mech, from, to };
             let (places, mut block) = (complex_places(&mut draw), ZERO);
             for (k, place) in places.iter().enumerate() {
                 place.put(&mut block, k);
             }
             let t: Row = std::array::from_fn(|_| draw.number());
             let results = RefCell::new(Vec::new());
-            on_each_width(Each { path: &path, place: &block, t: &t, results: &results });
+            on_each_width(Each { family: &family, place: &block, t: &t, results: &results });
             let all = results.into_inner();
             let bits = |e: &Evaluated| {
                 let blocks = [e.correction, e.rate].map(|b| b.map(|row| row.map(f64::to_bits)));
