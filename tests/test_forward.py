@@ -281,7 +281,8 @@ def test_modes_are_ordered_from_above_and_padded():
     modes = LU.assembly_modes(rows)
     assert modes.number.tolist() == [8, 0, 0]
     assert [code(s) for s in modes.status] == [Status.OK, Status.OK, Status.INVALID_INPUT]
-    assert (np.diff(modes.pose[0, :, 2, 3]) <= 0).all()
+    # Some are as high as others, up to rounding.
+    assert (np.diff(modes.pose[0, :, 2, 3]) <= 1e-9).all()
     assert np.isnan(modes.pose[1:]).all()
     assert (modes.mode_status[1:] == Status.INVALID_INPUT).all()
     shaped = LU.assembly_modes(rows[None, :, None])

@@ -40,6 +40,9 @@ const IMAGINARY_MEETING: f64 = 1e-3;
 /// Residual of a real pose, relative to the longest leg, that is rounding of zero.
 const EXACT: f64 = 1e-12;
 
+/// Numbers of real poses, as pure numbers, that are the same up to rounding.
+const EQUAL: f64 = 1e-9;
+
 /// How far, relative to those at home, the generic squared lengths are from real ones. Nearly singular poses of real
 /// mechanisms belong to solutions that run far away as the lengths change: from nearby they stay within reach.
 const GENERIC: f64 = 0.1;
@@ -354,13 +357,12 @@ pub fn assembly_modes(mech: &Mechanism, start: &Start, lengths: &[f64]) -> Modes
     Modes { modes, status }
 }
 
-/// How modes are ordered: by height, and equally high ones by the rest of the pose, rounded so that the order does not hang on
-/// rounding elsewhere.
+/// How modes are ordered: by height, and equally high ones by the rest of the pose.
 fn order(mech: &Mechanism, pose: &Pose<f64>, up: Vec3<f64>) -> [i64; 13] {
     let o = pose.o * (1.0 / mech.characteristic_length);
     let mut numbers =
         [up.dot(o)].into_iter().chain(o.array()).chain(pose.rotation.0.into_iter().flat_map(Vec3::array));
-    std::array::from_fn(|_| numbers.next().map_or(0, |x| (x / MEETING).round() as i64))
+    std::array::from_fn(|_| numbers.next().map_or(0, |x| (x / EQUAL).round() as i64))
 }
 
 /// Whether no path was lost, nor left for another: then two would have one regular end.
