@@ -228,6 +228,11 @@ def test_a_leg_that_points_backwards_has_no_answer() -> None:
         assert np.isfinite(numbers[0]).all()
         assert np.isnan(numbers[1]).all()
     assert not Status.BACKWARDS.has_answer
+    # Around the pose where the post has no length.
+    near = np.tile(np.eye(4), (4, 1, 1))
+    near[:, 2, 3] = [1e-3, 1e-8, -1e-8, -1e-3]
+    around = [Status.OUT_OF_STROKE, Status.SINGULAR, Status.SINGULAR, Status.BACKWARDS]
+    assert mech.inverse_kinematics(near).status.tolist() == around
     # All actuated legs are as long there as at home: it has their lengths, but is none to be in.
     lengths = mech.inverse_kinematics(mech.home).lengths
     modes = mech.assembly_modes(lengths)
