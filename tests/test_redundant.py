@@ -290,7 +290,8 @@ def test_assembly_modes_meet_all_lengths(name: str) -> None:
     modes = mech.assembly_modes(lengths)
     assert Status(int(modes.status)) is Status.OK
     assert np.sum(abs(modes.pose - pose[0]).max(axis=(1, 2)) < 1e-9) == 1
-    back = mech.inverse_kinematics(modes.pose).lengths
+    meant = modes.pose[modes.mode_status != Status.BACKWARDS]
+    back = mech.inverse_kinematics(meant).lengths
     assert abs(back - lengths)[:, mech.actuated].max() < 1e-11 * lengths.max()
     lengths[np.flatnonzero(mech.actuated)[-1]] += 0.02 * mech.characteristic_length
     none = mech.assembly_modes(lengths)

@@ -668,8 +668,9 @@ class Mechanism:
 
         The status is MODE_JUMP where the guess's mode ends on the way to these lengths, or a continued motion
         passes a singularity, so that the pose is one of another mode; NOT_CONVERGED where no pose was found;
-        SINGULAR where two modes meet, so that the pose is known to about 1e-7 only. Lengths that are negative
-        or not finite give INVALID_INPUT.
+        SINGULAR where two modes meet, so that the pose is known to about 1e-7 only; BACKWARDS where a leg
+        with an F joint would have to point backwards [T9]. Lengths that are negative or not finite give
+        INVALID_INPUT.
 
         Idle freedoms keep the spin of the guess [T71]. Lengths of redundant actuators must agree: the pose
         has all of them, to 1e-6 of the characteristic length, or the status is INCONSISTENT and there is

@@ -29,6 +29,7 @@ class Status(IntEnum):
     OUT_OF_REACH = 12
     OTHER_BRANCH = 13
     INCONSISTENT = 14
+    BACKWARDS = 15
 
     @property
     def has_answer(self) -> bool:

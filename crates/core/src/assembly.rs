@@ -5,7 +5,8 @@ use crate::constraint;
 use crate::leg;
 use crate::limits;
 use crate::mechanism::{
-    Body, Constraint, ConstraintKind, Drive, Joint, Leg, Load, Mechanism, Mobility, Rod, Side, Turning,
+    Body, Constraint, ConstraintKind, Direction, Drive, Joint, Leg, Load, Mechanism, Mobility, Rod, Side,
+    Turning,
 };
 use crate::mobility;
 use crate::real::{Constant, Scalar, Trig};
@@ -66,6 +67,7 @@ fn build(spec: &Spec, home: Pose<f64>) -> Mechanism {
 
     Mechanism {
         name: spec.name.clone(),
+        directions: Direction::of_all(&legs),
         legs,
         rods,
         platform: make_body(spec.platform.as_ref()),

@@ -46,8 +46,7 @@ pub fn of_leg<S: Scalar>(index: usize, leg: &Leg<S>) -> Vec<Constraint<S>> {
                 let first = direction.unwrap_or_else(|| axis.perpendicular());
                 [first, axis.cross(first)]
             };
-            let fixed = |joint: &Joint<S>| joint.axis.filter(|_| joint.kind == JointKind::Fixed);
-            match (fixed(&leg.base), fixed(&leg.platform)) {
+            match (leg.base.direction(), leg.platform.direction()) {
                 (None, None) => b.chain(two(m, None).map(|w| d(n, w))).collect(),
                 (Some(delta), None) => b.chain(two(n, Some(delta)).map(|w| d(w, m))).collect(),
                 (None, Some(delta)) => c.chain(two(m, Some(delta)).map(|w| d(n, w))).collect(),

@@ -2,7 +2,7 @@
 
 use crate::assembly;
 use crate::idle;
-use crate::mechanism::{Drive, Joint, Leg, Mechanism, Rod, Side, Turning};
+use crate::mechanism::{Direction, Drive, Joint, Leg, Mechanism, Rod, Side, Turning};
 use crate::real::Dual;
 use crate::spatial::Vec3;
 use crate::spec::JointKind;
@@ -163,6 +163,7 @@ pub fn varied(mech: &Mechanism, by: Option<&Parameter>) -> Mechanism<Dual<f64>> 
         mobility: mech.mobility.clone(),
         limits: mech.limits.clone(),
         idle: mech.idle.iter().map(|idle| idle::varied(idle, &legs)).collect(),
+        directions: Direction::of_all(&legs),
         legs,
         rods,
         constraints,

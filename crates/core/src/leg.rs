@@ -1,6 +1,6 @@
 //! One leg: where it is, how its platform end moves, how it turns, and how its links move.
 
-use crate::mechanism::{Drive, Leg, Side, Turning};
+use crate::mechanism::{Direction, Drive, Leg, Mechanism, Side, Turning};
 use crate::quadratic::{Hessian, add_centripetal, point_columns};
 use crate::real::{Constant, Ordered, Real};
 use crate::spatial::{Mat3, Motion, Pose, Vec3, Wrench};
@@ -46,6 +46,17 @@ pub fn position<T: Real>(leg: &Leg<impl Constant<T>>, pose: &Pose<T>) -> Positio
             Position { e, r, length: c, delta: r * (T::one() / c), coordinate: along - ahead }
         }
     }
+}
+
+/// r·d, d being the direction that a fixed joint gives to the leg: its length, or less than zero where the leg would have to
+/// point backwards \[T9\].
+#[inline(always)]
+pub fn ahead<S: Constant<T>, T: Real>(mech: &Mechanism<S>, direction: &Direction<S>, pose: &Pose<T>) -> T {
+    let d = match direction.side {
+        Side::Base => Vec3::lift(direction.axis),
+        Side::Platform => pose.rotation.of(direction.axis),
+    };
+    vectors(&mech.legs[direction.leg], pose).1.dot(d)
 }
 
 /// Where the strut begins, base axes.

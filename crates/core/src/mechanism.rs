@@ -75,6 +75,33 @@ pub struct Joint<S = f64> {
     pub cone_axis: Vec3<f64>,
 }
 
+impl<S: Copy> Joint<S> {
+    /// F: the leg's direction, from B to b.
+    #[must_use]
+    pub fn direction(&self) -> Option<Vec3<S>> {
+        if self.kind == JointKind::Fixed { self.axis } else { None }
+    }
+}
+
+/// The direction that a fixed joint gives to its leg, in the axes of its body.
+#[derive(Clone, Copy, Debug)]
+pub struct Direction<S = f64> {
+    pub leg: usize,
+    pub side: Side,
+    pub axis: Vec3<S>,
+}
+
+impl<S: Copy> Direction<S> {
+    /// Those of all fixed joints.
+    #[must_use]
+    pub fn of_all(legs: &[Leg<S>]) -> Vec<Self> {
+        let of = |leg, side, joint: &Joint<S>| joint.direction().map(|axis| Direction { leg, side, axis });
+        let of_leg =
+            |(i, leg): (usize, &Leg<S>)| [of(i, Side::Base, &leg.base), of(i, Side::Platform, &leg.platform)];
+        legs.iter().enumerate().flat_map(of_leg).flatten().collect()
+    }
+}
+
 #[derive(Clone, Debug)]
 pub struct Leg<S = f64> {
     pub name: String,
@@ -231,6 +258,8 @@ pub struct Mechanism<S = f64> {
     pub name: String,
     pub legs: Vec<Leg<S>>,
     pub rods: Vec<Rod<S>>,
+    /// Which way fixed joints hold their legs.
+    pub directions: Vec<Direction<S>>,
     pub platform: Body,
     pub gravity: Vec3<f64>,
     pub efficiency: f64,

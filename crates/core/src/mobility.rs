@@ -143,31 +143,35 @@ fn scaled_rows(rows: &[Wrench<f64>], sizes: &[f64], scale: f64) -> DMatrix<f64> 
     })
 }
 
-/// Indices of the constraints that raise the rank, taken in the order of the legs, at the poses of largest rank.
+/// Indices of the constraints that raise the rank at a pose, taken in the order of the legs: of all poses of largest rank those
+/// that are independent at the most poses.
 fn independent_rows(mech: &Mechanism, poses: &[Pose<f64>]) -> Vec<usize> {
     let size = mech.characteristic_length;
-    let choose = |pose: &Pose<f64>| {
+    let at = |pose: &Pose<f64>| {
         let rows: Vec<Wrench<f64>> = mech.constraints.iter().map(|c| constraint::row(c, pose)).collect();
         let sizes: Vec<f64> = rows.iter().map(|row| constraint::row_unit(row, size)).collect();
-        let all = scaled_rows(&rows, &sizes, size);
+        scaled_rows(&rows, &sizes, size)
+    };
+    let rows: Vec<DMatrix<f64>> = poses.iter().map(at).collect();
+    let independent = |rows: &DMatrix<f64>, set: &[usize]| rank_of(&rows.select_rows(set)) == set.len();
+    let raising = |rows: &DMatrix<f64>| {
         let mut chosen: Vec<usize> = Vec::new();
-        for i in 0..rows.len() {
-            let mut candidate = chosen.clone();
-            candidate.push(i);
-            if rank_of(&all.select_rows(&candidate)) == candidate.len() {
-                chosen = candidate;
+        for i in 0..rows.nrows() {
+            chosen.push(i);
+            if !independent(rows, &chosen) {
+                chosen.pop();
             }
         }
         chosen
     };
-    let mut best: Vec<usize> = Vec::new();
-    for pose in poses {
-        let chosen = choose(pose);
-        if chosen.len() > best.len() {
-            best = chosen;
-        }
-    }
-    best
+    let mut sets: Vec<Vec<usize>> = rows.iter().map(raising).collect();
+    let most = sets.iter().map(Vec::len).max().unwrap_or(0);
+    sets.retain(|set| set.len() == most);
+    sets.dedup();
+    // Of equals the last one is taken: from behind the first.
+    let best =
+        sets.into_iter().rev().max_by_key(|set| rows.iter().filter(|rows| independent(rows, set)).count());
+    best.unwrap_or_default()
 }
 
 fn rank_of(m: &DMatrix<f64>) -> usize {

@@ -2,6 +2,7 @@
 
 use crate::constraint;
 use crate::dynamics;
+use crate::leg;
 use crate::limits::{Limit, Measure};
 use crate::linear::solve;
 use crate::mechanism::Mechanism;
@@ -93,14 +94,16 @@ fn gradient(mech: &Mechanism, limit: &Limit, pose: &Pose<f64>) -> Vec3<f64> {
     Vec3::new(along(Vec3::X), along(Vec3::Y), along(Vec3::Z))
 }
 
-/// Whether a pose keeps the limits of conditioning and force; the latter at rest under the mechanism's own load.
+/// Whether no leg points backwards and a pose keeps the limits of conditioning and force; the latter at rest under the
+/// mechanism's own load.
 fn checked(mech: &Mechanism, pose: &Pose<f64>) -> bool {
-    mech.limits.iter().filter(|l| matches!(l.measure, Measure::Conditioning | Measure::Force { .. })).all(
-        |limit| {
-            let forces = matches!(limit.measure, Measure::Force { .. }).then(|| forces_at_rest(mech, pose));
-            limit.margin(mech, pose, forces.as_deref()) >= 0.0
-        },
-    )
+    let forwards = mech.directions.iter().all(|direction| leg::ahead(mech, direction, pose) > 0.0);
+    let kept = |limit: &Limit| {
+        let forces = matches!(limit.measure, Measure::Force { .. }).then(|| forces_at_rest(mech, pose));
+        limit.margin(mech, pose, forces.as_deref()) >= 0.0
+    };
+    let checked = |l: &&Limit| matches!(l.measure, Measure::Conditioning | Measure::Force { .. });
+    forwards && mech.limits.iter().filter(checked).all(kept)
 }
 
 fn forces_at_rest(mech: &Mechanism, pose: &Pose<f64>) -> Vec<f64> {

@@ -34,10 +34,12 @@ pub enum Status {
     OtherBranch = 13,
     /// The legs contradict one another: nothing has all that is asked of them.
     Inconsistent = 14,
+    /// A leg points backwards from a fixed joint: its length would be negative.
+    Backwards = 15,
 }
 
 impl Status {
-    pub const ALL: [Status; 15] = [
+    pub const ALL: [Status; 16] = [
         Status::Ok,
         Status::NoBranch,
         Status::Fold,
@@ -53,6 +55,7 @@ impl Status {
         Status::OutOfReach,
         Status::OtherBranch,
         Status::Inconsistent,
+        Status::Backwards,
     ];
 
     /// Whether there are numbers all the same: the pose is one, but beyond what the machine can reach.
@@ -113,6 +116,10 @@ impl Status {
             Status::Inconsistent => {
                 "the legs contradict one another: no pose nearby has all these lengths, or no motion all these rates or \
                  accelerations; more legs are actuated than the platform has freedoms, so that they must agree (1e-6)"
+            }
+            Status::Backwards => {
+                "a leg points backwards from its fixed joint (F), so that its length would be negative: the machine cannot be \
+                 there; give a pose or a guess on the side of home"
             }
             Status::InvalidInput => {
                 "the input holds NaN or infinity, or its rotation is not a rotation matrix"

@@ -2,15 +2,17 @@
 
 mod common;
 
-use common::{Draw, on_rod, published, six_sliders, states, with_leg};
-use polypod_core::coordinates::{MAX_COORDINATES, Set, Values};
+use common::{Draw, every_leg, on_rod, published, six_sliders, states, with_leg, with_leg_backwards};
+use polypod_core::batch::{self, Coordinates, Loads, States};
+use polypod_core::coordinates::{self, MAX_COORDINATES, Set, Values};
 use polypod_core::forward::{asked, error, forward_kinematics, polish, step_of};
 use polypod_core::jacobian::scaled_jacobian;
 use polypod_core::leg;
 use polypod_core::linear::solve;
 use polypod_core::mechanism::Mechanism;
 use polypod_core::modes::{Modes, assembly_modes, start};
-use polypod_core::spatial::{Mat3, Pose};
+use polypod_core::singularity::TOLERANCE;
+use polypod_core::spatial::{Mat3, Pose, Vec3};
 use polypod_core::status::Status;
 
 fn lengths(mech: &Mechanism, pose: &Pose<f64>) -> Vec<f64> {
@@ -248,4 +250,55 @@ fn modes_that_meet_are_found_together_and_told_apart_next_to_it() {
 #[ignore = "a sweep"]
 fn no_mode_is_missing_over_the_workspace() {
     compare_with_search(&published(), 2000, 400);
+}
+
+#[test]
+fn a_pose_with_a_leg_backwards_in_a_fixed_joint_is_none() {
+    for (i, letters) in every_leg().iter().enumerate() {
+        let mech = with_leg(letters, i as u64 + 1);
+        let (first, backwards) = (&mech.legs[0], with_leg_backwards(&mech));
+        let length = leg::position(first, &mech.home).length;
+        let ahead = |pose| mech.directions.iter().map(|d| leg::ahead(&mech, d, pose)).collect::<Vec<_>>();
+        let fixed = letters.matches('F').count();
+        assert_eq!([ahead(&mech.home).len(), ahead(&backwards).len()], [fixed; 2], "{letters}");
+        assert!(ahead(&mech.home).iter().all(|a| (a - length).abs() < 1e-12), "{letters}");
+        assert!(ahead(&backwards).iter().all(|a| (a + length).abs() < 1e-12), "{letters}");
+        let turned = Mat3::from_rotation_vector(Vec3::new(0.1, 0.2, 0.3)) * mech.home.rotation;
+        let off = Pose { rotation: turned, ..backwards };
+        let poses: Vec<f64> = [mech.home, backwards, off].iter().flat_map(Pose::matrix).collect();
+        let states = States { poses: &poses, twists: &[], accelerations: &[] };
+        let values: Vec<f64> = vec![0.0; 3 * mech.legs.len()];
+        let none = if fixed > 0 { Status::Backwards } else { Status::Ok };
+        for table in [
+            batch::inverse_kinematics(&mech, &poses),
+            batch::kinematics(&mech, &states),
+            batch::inverse_dynamics(&mech, &states, &Loads::Own, None),
+            batch::joint_reactions(&mech, &states, &Loads::Own, 1.0),
+            batch::limits(&mech, &states, &Loads::Own),
+            batch::platform_twist(&mech, &poses, &values),
+            batch::singularities(&mech, &poses, 1.0, TOLERANCE),
+            batch::coordinate_values(&mech, &Set::Pose, &poses),
+        ] {
+            // What breaks a constraint is told first.
+            let third = if mech.independent.is_empty() { Status::Ok } else { Status::OffConstraint };
+            let name = table.fields[0].name;
+            assert_eq!(table.status, [Status::Ok, none, third], "{letters}: {name}");
+        }
+        let (numbers, zero) = (Set::Pose.values(&mech, &backwards).map(|x| [x]), [0.0]);
+        let free = coordinates::best_given(&mech, &Set::Pose);
+        let guess = backwards.matrix();
+        for (all, guess) in [(true, None), (true, Some(&guess[..])), (false, Some(&guess))] {
+            let series = |k: usize| (all || free[k]).then_some([&numbers[k][..], &zero, &zero]);
+            let given = (0..6).map(series).collect();
+            let input = Coordinates { set: Set::Pose, given, branch: 1.0, guess, continued: false };
+            assert_eq!(batch::states(&mech, &input, 1).status, [none], "{letters}: states");
+        }
+        // Its lengths have it all the same.
+        let to: Vec<f64> = mech.legs.iter().map(|l| leg::position(l, &backwards).length).collect();
+        for continued in [false, true] {
+            let found = batch::forward_kinematics(&mech, &to, Some(&backwards.matrix()), continued);
+            assert_eq!(found.status, [none], "{letters}");
+            assert!(found.fields[0].data.iter().zip(backwards.matrix()).all(|(a, b)| (a - b).abs() < 1e-9));
+        }
+    }
 }

@@ -2,11 +2,12 @@
 
 mod common;
 
-use common::{published, with_leg};
+use common::{published, with_leg, with_leg_backwards};
 use polypod_core::constraint::largest_distance;
 use polypod_core::coordinates::Set;
 use polypod_core::lattice::Lattice;
 use polypod_core::leg;
+use polypod_core::limits::{Bound, Limit, Measure};
 use polypod_core::mechanism::Mechanism;
 use polypod_core::reach::fit;
 use polypod_core::singularity::conditioning;
@@ -143,4 +144,28 @@ fn a_mechanism_without_strokes_has_no_lattice_and_an_unreachable_start_no_flood(
     let mech = published();
     let high = Pose { o: Vec3::new(0.0, 0.0, 0.98), ..mech.home };
     assert!(Flood::new(&mech, grid(0.05), &high, false).is_none());
+}
+
+#[test]
+fn no_leg_points_backwards_in_a_fixed_joint() {
+    for (letters, held) in [("UPF", true), ("FPS", true), ("UPR", false), ("RPS", false)] {
+        let mech = with_leg(letters, 8);
+        let backwards = with_leg_backwards(&mech);
+        assert!(fit(&mech, &mech.home, mech.home.o).is_some(), "{letters}");
+        assert_eq!(fit(&mech, &backwards, backwards.o).is_none(), held, "{letters}");
+        // Strokes about the lengths that the start has.
+        let lattice = |start: &Pose<f64>| {
+            let mut mech = mech.clone();
+            for i in 0..mech.legs.len() {
+                let length = leg::position(&mech.legs[i], start).length;
+                for bound in [Bound::Least(length - 0.02), Bound::Most(length + 0.02)] {
+                    let (name, measure) = (String::new(), Measure::Length(i));
+                    mech.limits.push(Limit { name, measure, bound, scale: 1.0 });
+                }
+            }
+            Lattice::new(&mech, start, [[-4.0, 4.0]; 3], 0.01, 0.1)
+        };
+        assert!(lattice(&mech.home).is_some(), "{letters}");
+        assert_eq!(lattice(&backwards).is_none(), held, "{letters}");
+    }
 }

@@ -144,12 +144,22 @@ fn square_tolerance<V: Lanes>(mech: &Mechanism, c: &Constraint, pose: &Pose<V>) 
     square.scale(CONSTRAINT_TOLERANCE * CONSTRAINT_TOLERANCE)
 }
 
-/// Whether a pose satisfies the constraints.
+/// Whether a pose satisfies the constraints, with no leg backwards.
 #[inline(always)]
 pub(super) fn kept<V: Lanes>(mech: &Mechanism, pose: &Pose<V>, mut codes: Codes<V>) -> Codes<V> {
     for c in &mech.independent {
         let (value, square) = (constraint::value(c, pose), square_tolerance(mech, c, pose));
         codes = codes.unless((value * value).at_most(nearness(mech, square)), Status::OffConstraint);
+    }
+    forwards(mech, pose, codes)
+}
+
+/// Whether all legs point the way in which fixed joints hold them: constraints leave both \[T9\].
+#[inline(always)]
+pub(super) fn forwards<V: Lanes>(mech: &Mechanism, pose: &Pose<V>, mut codes: Codes<V>) -> Codes<V> {
+    for direction in &mech.directions {
+        let ahead = leg::ahead(mech, direction, pose);
+        codes = codes.unless(ahead.greater(V::zero()), Status::Backwards);
     }
     codes
 }
@@ -179,7 +189,7 @@ pub(super) fn with_twist<V: Lanes>(
     codes
 }
 
-/// Whether pose, twist and acceleration keep the constraints: `g = ġ = g̈ = 0` \[T65\].
+/// Whether pose, twist and acceleration keep the constraints, `g = ġ = g̈ = 0` \[T65\], with no leg backwards.
 #[inline(always)]
 pub(super) fn with_motion<V: Lanes>(mech: &Mechanism, platform: &Motion<V>, codes: Codes<V>) -> Codes<V> {
     let Motion { pose, twist, acceleration } = platform;
@@ -195,11 +205,7 @@ pub(super) fn with_motion<V: Lanes>(mech: &Mechanism, platform: &Motion<V>, code
             .unless((g.d * g.d).at_most(speed * square), Status::OffConstraint)
             .unless((g.dd * g.dd).at_most(sum * square), Status::OffConstraint);
     }
-    codes
-}
-
-pub(super) fn check_motion(mech: &Mechanism, platform: &Motion<f64>) -> Status {
-    with_motion(mech, platform, Codes::ok()).status()
+    forwards(mech, pose, codes)
 }
 
 /// The first of two outcomes that is not ok; the second is looked at only if the first is.

@@ -3,7 +3,7 @@
 use super::Table;
 use super::block::{self, Answers, At, Codes, Operation, Pieces};
 use super::checks::{
-    check_legs, check_motion, finite, is_rotation, pose_at, raw_pose, then, with_legs, with_motion,
+    check_legs, finite, forwards, is_rotation, pose_at, raw_pose, then, with_legs, with_motion,
 };
 use crate::coordinates::{self, Dependent, MAX_COORDINATES, Set, State, Values};
 use crate::lanes::Lanes;
@@ -128,9 +128,11 @@ impl Operation<6> for FromCoordinates<'_> {
         }
         let platform = coordinates::motion(&input.set.pose(mech, &q));
         codes = with_legs(mech, &platform.pose, codes);
-        if self.all_given {
-            codes = with_motion(mech, &platform, codes);
-        }
+        codes = if self.all_given {
+            with_motion(mech, &platform, codes)
+        } else {
+            forwards(mech, &platform.pose, codes)
+        };
         // Where branches meet the pose stands without its rates.
         let [x, y, z] = platform.pose.rotation.0;
         let found = finite(&[x.norm(), y.norm(), z.norm()]);
@@ -171,14 +173,16 @@ impl Operation<6> for FromCoordinates<'_> {
     }
 }
 
-/// A state is none where a leg has no frame, or where coordinates that were all given break the constraints.
+/// A state is none where a leg has no frame or points backwards, or where coordinates that were all given break the constraints.
 fn checked(mech: &Mechanism, mut state: State, all_given: bool) -> State {
     let pose = &state.platform.pose;
     // A root that a constraint has only because a leg has no frame there is none.
     state.status = then(state.status, || check_legs(mech, pose));
-    if all_given && state.status == Status::Ok {
-        state.status = check_motion(mech, &state.platform);
-    }
+    state.status = then(state.status, || {
+        let codes = Codes::ok();
+        if all_given { with_motion(mech, &state.platform, codes) } else { forwards(mech, pose, codes) }
+            .status()
+    });
     state
 }
 

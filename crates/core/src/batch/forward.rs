@@ -2,7 +2,7 @@
 
 use super::Table;
 use super::block::{self, Codes, Pieces, Rows};
-use super::checks::{actuated_values, is_rotation, joint_limits, raw_pose, then, with_legs};
+use super::checks::{actuated_values, forwards, is_rotation, joint_limits, raw_pose, then, with_legs};
 use crate::forward::{self, Asked, Found};
 use crate::forward_lanes::{Poses, forward_kinematics_of, load, load_asked, put, put_numbers};
 use crate::lanes::{self, Lanes, Row, Task, WIDTH};
@@ -82,6 +82,7 @@ pub fn forward_kinematics(
                 Status::Singular,
                 Status::ModeJump,
                 Status::Inconsistent,
+                Status::Backwards,
             ]
             .contains(&status);
             (last, before) =
@@ -122,7 +123,7 @@ fn put_found(rows: &mut Rows<'_, 3>, i: usize, found: &Found, status: Status) {
 fn check_found(mech: &Mechanism, asked: &[f64], pose: &Pose<f64>) -> Status {
     if mech.is_redundant() {
         let missed = least::error(mech, asked, pose);
-        let codes = with_legs(mech, pose, Codes::<f64>::ok());
+        let codes = forwards(mech, pose, with_legs(mech, pose, Codes::<f64>::ok()));
         return within_limits_missed(mech, pose, missed, codes).status();
     }
     block::read(checks(mech, [(asked, pose)])[0]).0
@@ -156,7 +157,8 @@ impl Task for Checks<'_> {
             let pose = load::<V>(self.poses, k);
             let asked = load_asked(mech, self.numbers, k);
             let missed = forward::error(mech, &asked, &pose);
-            let codes = on_branch(mech, &asked, &pose, with_legs(mech, &pose, Codes::ok()));
+            let codes = forwards(mech, &pose, with_legs(mech, &pose, Codes::ok()));
+            let codes = on_branch(mech, &asked, &pose, codes);
             within_limits_missed(mech, &pose, missed, codes).store(&mut self.codes[k..]);
             k += V::WIDTH;
         }

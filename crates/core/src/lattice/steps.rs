@@ -6,6 +6,7 @@ use crate::forward_lanes::{
     ARRIVED, BEGINNING, GOING, Newton, Piece, Pieces, Poses, get, load, newton, put, store,
 };
 use crate::lanes::{self, Lanes, Row, Task, WIDTH};
+use crate::leg;
 use crate::limits::{Limit, Seen};
 use crate::linear::solve_all;
 use crate::mechanism::Mechanism;
@@ -49,7 +50,7 @@ impl Room<'_> {
         self.joints_hold(pose) > 0.0 && self.others_hold(pose)
     }
 
-    /// 1 for poses in the bounds that keep the limits of joints.
+    /// 1 for poses in the bounds that keep the limits of joints, with no leg backwards.
     #[inline(always)]
     fn joints_hold<V: Lanes>(&self, pose: &Pose<V>) -> V {
         let mut inside = V::one();
@@ -58,6 +59,10 @@ impl Room<'_> {
             let [low, high] = self.bounds[k];
             inside = V::select(V::lit(low).at_most(o[k]), inside, V::zero());
             inside = V::select(o[k].at_most(V::lit(high)), inside, V::zero());
+        }
+        for direction in &self.mech.directions {
+            let ahead = leg::ahead(self.mech, direction, pose);
+            inside = V::select(ahead.greater(V::zero()), inside, V::zero());
         }
         let mut seen = Seen::default();
         for limit in &self.mech.limits {

@@ -4,6 +4,7 @@
 
 use polypod_core::assembly::assemble;
 use polypod_core::coordinates::{self, MAX_COORDINATES, Set};
+use polypod_core::leg;
 use polypod_core::mechanism::Mechanism;
 use polypod_core::mobility;
 use polypod_core::real::Jet;
@@ -114,6 +115,12 @@ pub fn with_leg(letters: &str, seed: u64) -> Mechanism {
     let mut legs = vec![letters.to_owned()];
     legs.resize(dof, "UPS".to_owned());
     generic(letters, &legs, 0, dof, seed)
+}
+
+/// A pose that keeps the constraints of [`with_leg`], with the first leg turned about and as long as at home.
+pub fn with_leg_backwards(mech: &Mechanism) -> Pose<f64> {
+    let r = leg::position(&mech.legs[0], &mech.home).r;
+    Pose { o: mech.home.o - r * 2.0, ..mech.home }
 }
 
 /// A mechanism whose last `count` legs are RPU on one rod, in planes of their own, with UPS legs for what freedoms
