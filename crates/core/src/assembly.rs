@@ -12,14 +12,12 @@ use crate::mobility;
 use crate::real::{Constant, Scalar, Trig};
 use crate::spatial::{Mat3, Pose, Vec3, Wrench};
 use crate::spec::{
-    ANGLE_TOLERANCE, BodySpec, Fault, JointKind, JointSpec, LegSpec, RodSpec, SliderSpec, Spec,
+    ANGLE_TOLERANCE, BodySpec, Fault, JointKind, JointSpec, LENGTH_TOLERANCE, LegSpec, RodSpec, SliderSpec,
+    Spec,
 };
 
 /// How far, relative to the characteristic length, the home pose may miss a constraint.
 const HOME_TOLERANCE: f64 = 1e-6;
-
-/// Legs shorter than this share of the characteristic length have coincident joints.
-const LENGTH_TOLERANCE: f64 = 1e-9;
 
 /// The shortest leg, m: below it the unit of lengths is wrong, and constraints in metres drown in rounding.
 const SHORTEST_LEG: f64 = 1e-6;
@@ -121,15 +119,21 @@ fn check_freedoms(mech: &Mechanism) -> Option<Fault> {
         return Some(Fault::new("mechanism", message));
     }
     let idle = mech.idle.len();
-    let needed = (dof - idle).max(1);
     if dof == 0 {
         return Some(Fault::new("legs", "together they leave the platform no freedom; release a joint"));
+    }
+    if idle == dof {
+        let message = format!(
+            "all {dof} freedoms of the platform are idle, so that no leg moves it; move a joint off the others"
+        );
+        return Some(Fault::new("legs", message));
     }
     let apart = match idle {
         0 => String::new(),
         1 => ", one of them idle".to_owned(),
         _ => format!(", {idle} of them idle"),
     };
+    let needed = dof - idle;
     let message = format!(
         "{actuators} actuated legs for {dof} freedoms{apart}; at least {needed} legs must be actuated"
     );

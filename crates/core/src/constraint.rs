@@ -6,7 +6,7 @@ use crate::mechanism::{Constraint, ConstraintKind, Joint, Leg, Mechanism, Partne
 use crate::quadratic::{Hessian, add_centripetal, add_mixed, point_columns};
 use crate::real::{Constant, Ordered, Real, Scalar, Trig};
 use crate::spatial::{Mat3, Pose, Vec3, Wrench};
-use crate::spec::{ANGLE_TOLERANCE, JointKind};
+use crate::spec::{ANGLE_TOLERANCE, JointKind, LENGTH_TOLERANCE};
 
 /// The constraints of one leg, from what its two joints say about its direction δ and its normal n.
 #[must_use]
@@ -96,7 +96,13 @@ pub fn of_rod<S: Trig + Constant<S>>(
             },
         }
     };
-    others.iter().map(make).collect()
+    // Through one point all their planes are the same, whatever the pose.
+    let point = |i: usize| mech_legs[i].platform.point.map(Real::value);
+    let apart = |i: &&usize| {
+        let (a, b) = (point(leader), point(**i));
+        (a - b).norm() > LENGTH_TOLERANCE * a.norm().max(b.norm())
+    };
+    others.iter().filter(apart).map(make).collect()
 }
 
 /// What a joint says about the leg's normal n: square to an axis of its body, or along one.

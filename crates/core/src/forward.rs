@@ -158,14 +158,19 @@ pub fn number_of(leg: &Leg, coordinate: f64) -> f64 {
     }
 }
 
-/// What is asked of the actuated legs.
+/// What is asked of the actuated legs, at most six.
 #[must_use]
 pub fn asked(mech: &Mechanism, coordinates: &[f64]) -> [Asked<f64>; 6] {
     let mut asked = [Asked::none(); 6];
-    for ((asked, (_, leg)), &q) in asked.iter_mut().zip(mech.actuated()).zip(coordinates) {
-        *asked = Asked::of(leg, number_of(leg, q));
+    for (asked, of_leg) in asked.iter_mut().zip(asked_of_all(mech, coordinates)) {
+        *asked = of_leg;
     }
     asked
+}
+
+/// The same, however many they are.
+pub fn asked_of_all(mech: &Mechanism, coordinates: &[f64]) -> impl Iterator<Item = Asked<f64>> {
+    mech.actuated().zip(coordinates).map(|((_, leg), &q)| Asked::of(leg, number_of(leg, q)))
 }
 
 /// Whether actuated legs can have these coordinates: numbers, and lengths none below zero.
@@ -358,23 +363,18 @@ pub fn polish(mech: &Mechanism, asked: &[Asked<f64>; 6], guess: &Pose<f64>) -> F
 /// The largest error of a length or of a constraint, m; NaN where one is not known.
 #[inline(always)]
 #[must_use]
-pub fn error<V: Ordered>(mech: &Mechanism, asked: &[Asked<V>; 6], pose: &Pose<V>) -> V {
-    let (mut errors, mut count) = ([V::zero(); 6], 0);
+pub fn error<V: Ordered>(mech: &Mechanism, asked: &[Asked<V>], pose: &Pose<V>) -> V {
+    let (mut largest, mut unknown, mut count) = (V::zero(), V::zero(), 0);
     for leg in &mech.legs {
         if leg.actuated {
             let r = asked[count].vector(leg, leg::vectors(leg, pose).1);
-            errors[count] = (r.norm() - asked[count].square.sqrt()).abs();
-            count += 1;
+            let e = (r.norm() - asked[count].square.sqrt()).abs();
+            (largest, unknown, count) = (largest.most(e), unknown + e * V::zero(), count + 1);
         }
     }
     for c in &mech.independent {
-        errors[count] = constraint::distance(c, pose, mech.characteristic_length);
-        count += 1;
-    }
-    let (mut largest, mut unknown) = (V::zero(), V::zero());
-    for e in errors {
-        largest = largest.most(e);
-        unknown = unknown + e * V::zero();
+        let e = constraint::distance(c, pose, mech.characteristic_length);
+        (largest, unknown) = (largest.most(e), unknown + e * V::zero());
     }
     largest + unknown
 }

@@ -4,12 +4,15 @@
 use nalgebra::{DMatrix, DVector};
 
 use crate::constraint;
-use crate::forward::{FOLD_PIVOTS, Found, LONGEST_STEP, are_coordinates, step_of};
+use crate::forward::{
+    Asked, FOLD_PIVOTS, Found, LONGEST_STEP, are_coordinates, asked_of_all, error, step_of,
+};
 use crate::leg;
-use crate::mechanism::Mechanism;
+use crate::mechanism::{Leg, Mechanism};
 use crate::mobility::RANK_TOLERANCE;
 use crate::redundant::pure_rows;
-use crate::spatial::Pose;
+use crate::singularity::pure_row;
+use crate::spatial::{Pose, Wrench};
 use crate::status::Status;
 use crate::svd::Svd;
 
@@ -53,18 +56,24 @@ struct Misses {
 }
 
 impl Misses {
-    fn at(mech: &Mechanism, lengths: &[f64], pose: &Pose<f64>) -> Option<Self> {
-        let scale = mech.characteristic_length;
-        let (rows, n) = (pure_rows(mech, pose, scale), lengths.len());
-        let short =
-            mech.actuated().zip(lengths).map(|((_, leg), asked)| leg::position(leg, pose).coordinate - asked);
+    fn at(mech: &Mechanism, asked: &[Asked<f64>], pose: &Pose<f64>) -> Option<Self> {
+        let (scale, n) = (mech.characteristic_length, asked.len());
+        // Rows and errors of the lengths from the places that are asked for: those of a slider have no branch.
+        let of_leg = |((_, leg), asked): ((usize, &Leg), &Asked<f64>)| {
+            let (e, r) = leg::vectors(leg, pose);
+            let r = asked.vector(leg, r);
+            (pure_row(Wrench::at(e, r.unit()), scale), r.norm() - asked.square.sqrt())
+        };
+        let (rows, short): (Vec<[f64; 6]>, Vec<f64>) = mech.actuated().zip(asked).map(of_leg).unzip();
         let idle = mech.idle.iter().map(|_| 0.0);
         let off = mech.independent.iter().map(|c| constraint::value(c, pose) * constraint::length(c, scale));
-        let legs = DVector::from_iterator(n, short) / scale;
-        let others = DVector::from_iterator(rows.len() - n, idle.chain(off)) / scale;
+        let legs = DVector::from_vec(short) / scale;
+        let others =
+            DVector::from_iterator(mech.idle.len() + mech.independent.len(), idle.chain(off)) / scale;
         let of_legs = DMatrix::from_fn(n, 6, |i, j| rows[i][j]);
         // First what the others ask for, then what the legs ask for within that; each of least size.
-        let held = Svd::of(&DMatrix::from_fn(others.len(), 6, |i, j| rows[n + i][j]))?;
+        let rest = pure_rows(mech, pose, scale);
+        let held = Svd::of(&DMatrix::from_fn(others.len(), 6, |i, j| rest[n + i][j]))?;
         let (first, rank) = least(&held, &others);
         let allowed = held.v_t.rows(rank, 6 - rank).transpose();
         let on_allowed = Svd::of(&(&of_legs * &allowed))?;
@@ -110,13 +119,14 @@ pub fn forward_kinematics(mech: &Mechanism, lengths: &[f64], guess: &Pose<f64>) 
         return nothing;
     }
     let lost = Found { status: Status::NotConverged, ..nothing };
-    let Some(mut at) = Misses::at(mech, lengths, guess) else { return lost };
+    let asked: Vec<Asked<f64>> = asked_of_all(mech, lengths).collect();
+    let Some(mut at) = Misses::at(mech, &asked, guess) else { return lost };
     let (mut pose, mut share, mut iterations) = (*guess, 1.0_f64, 0);
     while at.size > ROUNDING && iterations < STEPS {
         iterations += 1;
         share = share.min(LONGEST_STEP / at.size);
         let next = pose.stepped(&step_of(mech, at.step, share));
-        let trial = Misses::at(mech, lengths, &next);
+        let trial = Misses::at(mech, &asked, &next);
         let near = at.size <= NEAR;
         let promised = 0.1 * share * (at.merit() - at.left).max(0.0);
         match trial {
@@ -142,18 +152,8 @@ pub fn forward_kinematics(mech: &Mechanism, lengths: &[f64], guess: &Pose<f64>) 
         (false, false) => Status::NotConverged,
     };
     let sign = if mech.mobility.uncontrolled > 0 { 0.0 } else { 1.0 };
-    let residual = error(mech, lengths, &pose);
+    let residual = error(mech, &asked, &pose);
     Found { pose, residual, iterations, sign, status }
-}
-
-/// The largest error of a length or of a constraint, m.
-#[must_use]
-pub fn error(mech: &Mechanism, lengths: &[f64], pose: &Pose<f64>) -> f64 {
-    let legs = mech
-        .actuated()
-        .zip(lengths)
-        .map(|((_, leg), asked)| (leg::position(leg, pose).coordinate - asked).abs());
-    legs.fold(constraint::largest_distance(mech, pose), |m, e| if e > m || e.is_nan() { e } else { m })
 }
 
 #[cfg(test)]

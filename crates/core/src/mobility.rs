@@ -22,6 +22,10 @@ pub(crate) const RANK_TOLERANCE: f64 = 1e-9;
 /// Generic poses looked at.
 const SAMPLES: u32 = 12;
 
+/// How far from home they are sought, in characteristic lengths and radians, nearer where the mechanism cannot be so far off: poses
+/// far away may be those of another mode.
+const SPREADS: [f64; 4] = [0.03, 0.01, 0.003, 0.001];
+
 const NEWTON_STEPS: usize = 60;
 
 /// A small count as a number: exact.
@@ -85,23 +89,33 @@ fn joint_freedoms(kind: &str) -> usize {
     }
 }
 
-/// Poses near home that satisfy the constraints, the same ones every time.
+/// Poses near home that the mechanism can have, the same ones every time.
 pub(crate) fn generic_poses(mech: &Mechanism) -> Vec<Pose<f64>> {
     let mut draw = Draw(0x2545_F491_4F6C_DD1D);
     let size = mech.characteristic_length;
     let mut poses = Vec::new();
     for _ in 0..SAMPLES {
-        let mut vector = || draw.vector(Draw::number);
-        let start = Pose {
-            rotation: Mat3::from_rotation_vector(vector() * 0.3) * mech.home.rotation,
-            o: mech.home.o + vector() * (0.3 * size),
+        let [turn, shift] = [(); 2].map(|()| draw.vector(Draw::number));
+        let near = |spread: f64| {
+            let rotation = Mat3::from_rotation_vector(turn * spread) * mech.home.rotation;
+            let start = Pose { rotation, o: mech.home.o + shift * (spread * size) };
+            project(&mech.constraints, size, &start).filter(|pose| is_possible(mech, pose))
         };
-        poses.extend(project(&mech.constraints, size, &start));
+        poses.extend(SPREADS.into_iter().find_map(near));
     }
     if poses.is_empty() {
         poses.push(mech.home);
     }
     poses
+}
+
+/// Whether every leg has a length, and every strut its rail within reach, with none backwards in a fixed joint.
+fn is_possible(mech: &Mechanism, pose: &Pose<f64>) -> bool {
+    let has_length =
+        |leg: &Leg| leg::position(leg, pose).length > RANK_TOLERANCE * mech.characteristic_length;
+    let reaches = |leg: &Leg| leg::position(leg, pose).coordinate.is_finite();
+    let forwards = mech.directions.iter().all(|direction| leg::ahead(mech, direction, pose) > 0.0);
+    forwards && mech.legs.iter().all(|leg| has_length(leg) && reaches(leg))
 }
 
 /// The pose that satisfies `constraints`, found from `start` by damped Gauss-Newton steps of least size, or none.

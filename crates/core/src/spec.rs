@@ -515,6 +515,9 @@ impl Faults {
 /// Lengths of axes in a file: any, as long as squares of it are numbers.
 const AXIS_LENGTHS: RangeInclusive<f64> = 1e-100..=1e100;
 
+/// Points nearer than this share of a mechanism's lengths coincide.
+pub const LENGTH_TOLERANCE: f64 = 1e-9;
+
 /// Sine of the largest angle by which axes given in a file may miss their relation.
 pub const ANGLE_TOLERANCE: f64 = 1e-6;
 

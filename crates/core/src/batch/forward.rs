@@ -3,7 +3,7 @@
 use super::Table;
 use super::block::{self, Codes, Pieces, Rows};
 use super::checks::{actuated_values, forwards, is_rotation, joint_limits, raw_pose, then, with_legs};
-use crate::forward::{self, Asked, Found};
+use crate::forward::{self, Asked, Found, asked_of_all};
 use crate::forward_lanes::{Poses, forward_kinematics_of, load, load_asked, put, put_numbers};
 use crate::lanes::{self, Lanes, Row, Task, WIDTH};
 use crate::least;
@@ -122,9 +122,8 @@ fn put_found(rows: &mut Rows<'_, 3>, i: usize, found: &Found, status: Status) {
 /// Whether a pose that was found for lengths is one that the mechanism can be in, and within its limits.
 fn check_found(mech: &Mechanism, asked: &[f64], pose: &Pose<f64>) -> Status {
     if mech.is_redundant() {
-        let missed = least::error(mech, asked, pose);
-        let codes = forwards(mech, pose, with_legs(mech, pose, Codes::<f64>::ok()));
-        return within_limits_missed(mech, pose, missed, codes).status();
+        let asked: Vec<Asked<f64>> = asked_of_all(mech, asked).collect();
+        return check(mech, &asked, pose).status();
     }
     block::read(checks(mech, [(asked, pose)])[0]).0
 }
@@ -148,21 +147,25 @@ struct Checks<'a> {
 }
 
 impl Task for Checks<'_> {
-    /// A root that a constraint has only because a leg has no frame there is none. Strokes are judged by the lengths
-    /// that were asked for, which the pose's own miss by its error: lengths at the very end of a stroke are within it.
     #[inline(always)]
     fn run<V: Lanes>(self) {
         let (mech, mut k) = (self.mech, 0);
         while k < WIDTH {
             let pose = load::<V>(self.poses, k);
             let asked = load_asked(mech, self.numbers, k);
-            let missed = forward::error(mech, &asked, &pose);
-            let codes = forwards(mech, &pose, with_legs(mech, &pose, Codes::ok()));
-            let codes = on_branch(mech, &asked, &pose, codes);
-            within_limits_missed(mech, &pose, missed, codes).store(&mut self.codes[k..]);
+            check(mech, &asked, &pose).store(&mut self.codes[k..]);
             k += V::WIDTH;
         }
     }
+}
+
+/// A root that a constraint has only because a leg has no frame there is none. Strokes are judged by the lengths
+/// that were asked for, which the pose's own miss by its error: lengths at the very end of a stroke are within it.
+#[inline(always)]
+fn check<V: Lanes>(mech: &Mechanism, asked: &[Asked<V>], pose: &Pose<V>) -> Codes<V> {
+    let missed = forward::error(mech, asked, pose);
+    let codes = forwards(mech, pose, with_legs(mech, pose, Codes::ok()));
+    within_limits_missed(mech, pose, missed, on_branch(mech, asked, pose, codes))
 }
 
 /// The first limit of a joint that a pose breaks which may miss lengths by so much.
@@ -189,7 +192,7 @@ fn within_limits_missed<V: Lanes>(
 #[inline(always)]
 fn on_branch<V: Lanes>(
     mech: &Mechanism,
-    asked: &[Asked<V>; 6],
+    asked: &[Asked<V>],
     pose: &Pose<V>,
     mut codes: Codes<V>,
 ) -> Codes<V> {
