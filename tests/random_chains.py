@@ -38,6 +38,8 @@ ON_ROD = tuple(f"(R)P{above}" for above in "SURF")
 ON_RAIL = ("PUS", "PSS", "PSU", "PRS", "PRU", "PUU")
 FREE = ("UPS", "SPS", "SPU", "PUS", "PSS", "PSU")
 """Without constraints."""
+TRIES = 2_000
+"""To place a leg."""
 FAULTY = 0.03
 """Share of sliders that must be refused."""
 FAULTS = ("base.axis", "base.joint", "platform.joint", "slider.strut")
@@ -66,9 +68,21 @@ class Lines:
 # --- mechanisms ---------------------------------------------------------------------------------------------
 
 
+class NoRoom(Exception):
+    """A leg finds no place: a rod that goes through the point where all legs end, say."""
+
+
 def draw(number: int) -> Drawn:
     """The mechanism of a number, the same every time."""
-    rng = np.random.default_rng([SEED, number])
+    for again in itertools.count():
+        try:
+            return _draw(number, np.random.default_rng([SEED, number, *[2] * again]))
+        except NoRoom:
+            continue
+    raise AssertionError
+
+
+def _draw(number: int, rng: np.random.Generator) -> Drawn:
     if number < TELESCOPIC:
         style = name = ("general", "aligned")[number % 2]
     else:
@@ -118,7 +132,8 @@ def _kinds(rng: np.random.Generator, name: str, lines: Lines) -> list[str]:
             kinds = _general_kinds(rng, rails, ON_ROD)
             return [*kinds, *map(str, rng.choice(FREE, size=int(rng.integers(1, 4))))]
     # Above, S alone lets the platform spin about the line; below, also what has its axis there.
-    fitting = [kind for kind in rails if kind[-1] == "S" or lines.platform is None]
+    table = rails if rng.random() < 0.5 else KINDS
+    fitting = [kind for kind in table if kind[-1] == "S" or lines.platform is None]
     if lines.base is not None:
         fitting = [kind for kind in fitting if letters(kind)[0] in "SU"]
     on_rod = tuple(kind for kind in ON_ROD if kind[-1] == "S" or lines.platform is None)
@@ -221,7 +236,7 @@ def _leg(
     """A leg whose axes fit at home: both joints give it one normal."""
     turn, o = home[:3, :3], home[:3, 3]
     line = lines.base
-    while True:
+    for _ in range(TRIES):
         below = _on(rng, style, 0.9, line)
         local = _on(rng, style, 0.5, lines.platform)
         r = o + turn @ local - below
@@ -229,6 +244,8 @@ def _leg(
         lean = 0.0 if line is None else abs(unit(r) @ line[1])
         if length > 0.4 and _apart(below, local, others) and lean < 0.95:
             break
+    else:
+        raise NoRoom
     delta = r / length
     on_rod = kind[0] == "("
     base_letter, letter = ("R" if on_rod else kind[0]), kind[-1]
@@ -253,7 +270,7 @@ def _slider(
     """A leg on a rail, which is the line below if there is one."""
     turn, o = home[:3, :3], home[:3, 3]
     _, base_letter, letter = kind
-    while True:
+    for _ in range(TRIES):
         foot, local = _on(rng, style, 0.9, lines.base), _on(rng, style, 0.5, lines.platform)
         rail = _axis(rng, style) if lines.base is None else lines.base[1]
         place = float(rng.choice([-0.5, 0.0, 0.5]) if style == "aligned" else rng.uniform(-0.5, 0.5))
@@ -262,6 +279,8 @@ def _slider(
         lean, across = unit(r) @ rail, float(np.linalg.norm(np.cross(unit(r), rail)))
         if length > 0.4 and abs(lean) > 0.1 and across > 0.3 and _apart(foot - place * rail, local, others):
             break
+    else:
+        raise NoRoom
     delta, square = r / length, unit(np.cross(rail, r))
     fault = str(rng.choice(FAULTS)) if rng.random() < FAULTY else None
     if fault == "base.axis" and kind not in ("PRS", "PRU", "PUU"):
