@@ -1,123 +1,156 @@
-"""Random mechanisms of all leg kinds, and their mobility by definition: screws of all joints, closed loops.
+"""Random mechanisms of all leg kinds: files, with the screws that they are drawn from.
 
-Nothing here is shared with Polypod: a leg is the row of its joints as screws at home, a pose the product of
-their exponentials, and freedoms are null vectors of the loop closures.
+Those of the first numbers have telescopic legs in general positions, or, every second one, points on a grid
+and axes that are often parallel, which makes redundant constraints. Later ones, in both ways, have legs on
+sliders too, more actuators than freedoms, or idle freedoms.
 """
 
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from random_screws import (
+    POSES,
+    SEED,
+    SI,
+    Array,
+    Drawn,
+    Leg,
+    Mobility,
+    positions,
+    rotation,
+    rotation_vector,
+    turning,
+    unit,
+)
 
-SEED = 70011
-SI = {"length": "m", "angle": "rad", "mass": "kg", "inertia": "kg m^2"}
-POSES = 3
-"""At which a mechanism's freedoms are counted: at a singular one a rank is less."""
-RANK = 1e-7
-"""Singular values below this part of the largest are zero: poses are known to 1e-12."""
-
+TELESCOPIC = 10_000
+"""From this number on, the other styles."""
+STYLES = ("rails", "aligned rails", "redundant", "idle")
 FREEDOMS = {"S": 3, "U": 2, "R": 1, "F": 0}
 KINDS = tuple(f"{below}P{above}" for below, above in itertools.product("SURF", repeat=2))
 """Without rods; with one, base R."""
 ON_ROD = tuple(f"(R)P{above}" for above in "SURF")
+ON_RAIL = ("PUS", "PSS", "PSU", "PRS", "PRU", "PUU")
+FREE = ("UPS", "SPS", "SPU", "PUS", "PSS", "PSU")
+"""Without constraints."""
+TRIES = 2_000
+"""To place a leg."""
+FAULTY = 0.03
+"""Share of sliders that must be refused."""
+FAULTS = ("base.axis", "base.joint", "platform.joint", "slider.strut")
+
+
+def letters(kind: str) -> tuple[str, str]:
+    """Joints of a leg, below and above. A rod's turning counts as the leg's."""
+    return "U" if kind[0] == "(" else kind.replace("P", "", 1)[0], kind[-1]
 
 
 def constraints_of(kind: str) -> int:
-    """Of one leg with generic axes: six less its joints' freedoms. A rod's turning counts as the leg's."""
-    below, above = ("U" if kind[0] == "(" else kind[0]), kind[-1]
+    """Of one leg with generic axes: six less its joints' freedoms."""
+    below, above = letters(kind)
     return max(0, 6 - (FREEDOMS[below] + 1 + FREEDOMS[above]))
 
 
-@dataclass
-class Leg:
-    kind: str
-    screws: list[Array]
-    """(6,) each, velocity at the origin and turn, base axes at home; from the base up, without the rod's."""
-    slide: int
-    """Which of them is the prismatic joint."""
-    length: float
-    rod: int | None = None
-    actuated: bool = True
-    table: dict[str, Any] = field(default_factory=dict)
+@dataclass(frozen=True)
+class Lines:
+    """Where points must lie: a point and a unit direction each, of the platform in its axes."""
+
+    base: tuple[Array, Array] | None = None
+    platform: tuple[Array, Array] | None = None
+    """Without a direction, of length zero, all joints are at the point."""
 
 
-@dataclass
-class Drawn:
-    """A random mechanism: its joints as screws, and its file."""
-
-    number: int
-    style: str
-    legs: list[Leg]
-    rods: list[Array]
-    """Screw of each rod's turning."""
-    home: Array
-    """(4, 4)."""
-    data: dict[str, Any]
-    poses: list[Array] = field(default_factory=list)
-    """Joint values of some poses near home, with all loops closed."""
-
-    @property
-    def kinds(self) -> tuple[str, ...]:
-        return tuple(leg.kind for leg in self.legs)
+# --- mechanisms ---------------------------------------------------------------------------------------------
 
 
-# --- drawing ------------------------------------------------------------------------------------------------
-
-
-def unit(v: Array) -> Array:
-    return v / np.linalg.norm(v)
+class NoRoom(Exception):
+    """A leg finds no place: a rod that goes through the point where all legs end, say."""
 
 
 def draw(number: int) -> Drawn:
-    """The mechanism of a number, the same every time.
+    """The mechanism of a number, the same every time."""
+    for again in itertools.count():
+        try:
+            return _draw(number, np.random.default_rng([SEED, number, *[2] * again]))
+        except NoRoom:
+            continue
+    raise AssertionError
 
-    Its legs have points and axes in general positions, or, every second time, points on a grid and axes that
-    are often parallel, which makes redundant constraints.
-    """
-    rng = np.random.default_rng([SEED, number])
-    style = ("general", "aligned")[number % 2]
+
+def _draw(number: int, rng: np.random.Generator) -> Drawn:
+    if number < TELESCOPIC:
+        style = name = ("general", "aligned")[number % 2]
+    else:
+        name = STYLES[number % len(STYLES)]
+        style = {"rails": "general", "aligned rails": "aligned"}.get(name, "")
+        style = style or ("general", "aligned")[int(rng.random() < 0.4)]
     turn = rotation(rng.normal(size=3) * 0.4) if style == "general" or rng.random() < 0.3 else np.eye(3)
     home = np.eye(4)
     home[:3, :3], home[:3, 3] = turn, np.array([0.0, 0.0, 1.0])
     if style == "general":
         home[:3, 3] += rng.normal(size=3) * 0.2
-    kinds = _general_kinds(rng) if style == "general" else _aligned_kinds(rng)
-    rods: list[Array] = []
-    lines: list[tuple[Array, Array]] = []
-    legs: list[Leg] = []
+    lines = _lines(rng, style) if name == "idle" else Lines()
+    kinds = _kinds(rng, name, lines)
+    rod, legs = lines.base, []
     for kind in kinds:
         on_rod = kind[0] == "("
-        if on_rod and not lines:
-            point, axis = _point(rng, style, 0.8), _axis(rng, style)
-            lines.append((point, axis))
-            rods.append(turning(axis, point))
-        legs.append(_leg(rng, style, kind, home, lines[0] if on_rod else None, legs))
+        if on_rod and rod is None:
+            rod = _point(rng, style, 0.8), _axis(rng, style)
+        own = Lines(rod if on_rod else lines.base, lines.platform)
+        legs.append((_slider if kind[0] == "P" else _leg)(rng, style, kind, home, own, legs))
+    rods = [rod] if rod is not None and any(kind[0] == "(" for kind in kinds) else []
     data: dict[str, Any] = {"name": f"drawn {number}", "units": dict(SI)}
     data["home"] = {"position": home[:3, 3].tolist(), "rotation_vector": rotation_vector(turn).tolist()}
     data["platform"] = body(rng)
-    data["rods"] = [{"name": "L", "point": p.tolist(), "axis": a.tolist()} | body(rng) for p, a in lines]
+    data["rods"] = [{"name": "L", "point": p.tolist(), "axis": a.tolist()} | body(rng) for p, a in rods]
     data["legs"] = [leg.table for leg in legs]
-    drawn = Drawn(number, style, legs, rods, home, data)
-    drawn.poses = positions(drawn, POSES)
-    _actuate(rng, drawn)
+    drawn = Drawn(number, name, legs, [turning(a, p) for p, a in rods], home, data)
+    if not drawn.faults:
+        drawn.poses = positions(drawn, POSES)
+        _actuate(rng, drawn)
     return drawn
 
 
-def _general_kinds(rng: np.random.Generator) -> list[str]:
+def _kinds(rng: np.random.Generator, name: str, lines: Lines) -> list[str]:
+    """Of the legs in a style."""
+    rails = KINDS + 3 * ON_RAIL
+    match name:
+        case "general":
+            return _general_kinds(rng, KINDS, ON_ROD)
+        case "aligned":
+            return _aligned_kinds(rng, KINDS + ON_ROD, ["UPS", "SPS", "SPU"])
+        case "rails":
+            return _general_kinds(rng, rails, ON_ROD)
+        case "aligned rails":
+            return _aligned_kinds(rng, rails, ["UPS", *ON_RAIL[:3]])
+        case "redundant":
+            kinds = _general_kinds(rng, rails, ON_ROD)
+            return [*kinds, *map(str, rng.choice(FREE, size=int(rng.integers(1, 4))))]
+    # Above, S alone lets the platform spin about the line; below, also what has its axis there.
+    table = rails if rng.random() < 0.5 else KINDS
+    fitting = [kind for kind in table if kind[-1] == "S" or lines.platform is None]
+    if lines.base is not None:
+        fitting = [kind for kind in fitting if letters(kind)[0] in "SU"]
+    on_rod = tuple(kind for kind in ON_ROD if kind[-1] == "S" or lines.platform is None)
+    kinds = _general_kinds(rng, tuple(fitting), on_rod)
+    # One leg fewer holds all the rest.
+    return kinds[1:] if len(kinds) > 2 and rng.random() < 0.7 else kinds
+
+
+def _general_kinds(rng: np.random.Generator, table: tuple[str, ...], on_rod: tuple[str, ...]) -> list[str]:
     """Legs that leave at least one freedom, and as many legs as freedoms."""
     left, kinds = int(rng.integers(0, 6)), []
-    constrained = [kind for kind in KINDS if constraints_of(kind)]
-    free = [kind for kind in KINDS if not constraints_of(kind)]
+    constrained = [kind for kind in table if constraints_of(kind)]
+    free = [kind for kind in table if not constraints_of(kind)]
     if (
         left >= 1 and rng.random() < 0.3
     ):  # a rod: its first leg as one on a U joint, one more constraint each other
-        first, *others = rng.choice(ON_ROD, size=int(rng.integers(2, 4))).tolist()
+        first, *others = rng.choice(on_rod, size=int(rng.integers(2, 4))).tolist()
         cost = constraints_of(first) + sum(constraints_of(kind) + 1 for kind in others)
         if cost <= left:
             kinds, left = [first, *others], left - cost
@@ -135,16 +168,45 @@ def _filled(rng: np.random.Generator, kinds: list[str], free: list[str]) -> list
     return [str(kind) for kind in rng.permutation(kinds)]
 
 
-def _aligned_kinds(rng: np.random.Generator) -> list[str]:
+def _aligned_kinds(rng: np.random.Generator, table: tuple[str, ...], free: list[str]) -> list[str]:
     """One to four legs of any kinds, often several of one, and sometimes free ones beside them."""
-    table = KINDS + ON_ROD
     if rng.random() < 0.4:
         kinds = [str(rng.choice(table))] * int(rng.integers(2, 5))
     else:
         kinds = rng.choice(table, size=int(rng.integers(1, 5))).tolist()
-    return [
-        str(kind) for kind in kinds + rng.choice(["UPS", "SPS", "SPU"], size=int(rng.integers(0, 4))).tolist()
-    ]
+    return [str(kind) for kind in kinds + rng.choice(free, size=int(rng.integers(0, 4))).tolist()]
+
+
+def _lines(rng: np.random.Generator, style: str) -> Lines:
+    """A line for all joints above, or below, or one each; or a point above."""
+    # The line below is rather level: legs must not lie along it.
+    level = np.eye(3)[rng.integers(2)] if style == "aligned" else unit(rng.normal(size=3) * [1.0, 1.0, 0.2])
+    below, above = (_point(rng, style, 0.5), level), (_point(rng, style, 0.3), _axis(rng, style))
+    match rng.choice(["above", "below", "both", "point"], p=[0.4, 0.35, 0.15, 0.1]):
+        case "above":
+            return Lines(platform=above)
+        case "below":
+            return Lines(base=below)
+        case "both":
+            return Lines(below, above)
+    return Lines(platform=(above[0], np.zeros(3)))
+
+
+def _actuate(rng: np.random.Generator, drawn: Drawn) -> None:
+    """As many legs as freedoms that need one, if there are as many; now and then another number."""
+    own = Mobility.of(drawn)
+    number = own.dof
+    if drawn.number >= TELESCOPIC:
+        number += int(rng.integers(1, 4)) if drawn.style == "redundant" else -own.idle
+    if rng.random() >= 0.9:
+        number = int(rng.integers(0, len(drawn.legs) + 1))
+    chosen = rng.permutation(len(drawn.legs))[:number]
+    for i, leg in enumerate(drawn.legs):
+        leg.actuated = i in chosen
+        leg.table["actuated"] = bool(leg.actuated)
+
+
+# --- legs ---------------------------------------------------------------------------------------------------
 
 
 def _point(rng: np.random.Generator, style: str, size: float) -> Array:
@@ -157,45 +219,91 @@ def _axis(rng: np.random.Generator, style: str) -> Array:
     return np.eye(3)[rng.integers(3)] if style == "aligned" else unit(rng.normal(size=3))
 
 
+def _on(rng: np.random.Generator, style: str, size: float, line: tuple[Array, Array] | None) -> Array:
+    """A point of a line, or anywhere."""
+    return _point(rng, style, size) if line is None else line[0] + line[1] * rng.integers(-2, 3) * 0.4
+
+
+def _apart(base: Array, platform: Array, others: list[Leg]) -> bool:
+    """Whether no other leg has these points."""
+    known = [leg.table["base"]["point"] + leg.table["platform"]["point"] for leg in others]
+    return all(np.abs(np.array([*base, *platform]) - other).max() > 1e-3 for other in known)
+
+
 def _leg(
-    rng: np.random.Generator,
-    style: str,
-    kind: str,
-    home: Array,
-    line: tuple[Array, Array] | None,
-    others: list[Leg],
+    rng: np.random.Generator, style: str, kind: str, home: Array, lines: Lines, others: list[Leg]
 ) -> Leg:
     """A leg whose axes fit at home: both joints give it one normal."""
     turn, o = home[:3, :3], home[:3, 3]
-    while True:
-        below = _point(rng, style, 0.9) if line is None else line[0] + line[1] * rng.integers(-2, 3) * 0.4
-        local = _point(rng, style, 0.5)
+    line = lines.base
+    for _ in range(TRIES):
+        below = _on(rng, style, 0.9, line)
+        local = _on(rng, style, 0.5, lines.platform)
         r = o + turn @ local - below
         length = float(np.linalg.norm(r))
-        known = [leg.table["base"]["point"] + leg.table["platform"]["point"] for leg in others]
-        apart = all(np.abs(np.array([*below, *local]) - other).max() > 1e-3 for other in known)
-        along = 0.0 if line is None else abs(unit(r) @ line[1])
-        if length > 0.4 and apart and along < 0.95:
+        lean = 0.0 if line is None else abs(unit(r) @ line[1])
+        if length > 0.4 and _apart(below, local, others) and lean < 0.95:
             break
+    else:
+        raise NoRoom
     delta = r / length
-    normal = unit(np.cross(line[1], delta)) if line is not None else _normal(rng, style, delta)
-    base_letter, letter = ("R" if line is not None else kind[0]), kind[-1]
-    above = below + r
-    base, first = _joint(rng, style, base_letter, below, delta, normal, np.eye(3), below)
-    platform, last = _joint(rng, style, letter, local, delta, normal, turn, above)
-    if line is not None:
+    on_rod = kind[0] == "("
+    base_letter, letter = ("R" if on_rod else kind[0]), kind[-1]
+    along = line[1] if line is not None and base_letter != "S" else None
+    normal = unit(np.cross(along, delta)) if along is not None else _normal(rng, style, delta)
+    base, lower = _joint(rng, style, base_letter, below, delta, normal, np.eye(3), below, along)
+    platform, upper = _joint(rng, style, letter, local, delta, normal, turn, below + r)
+    if on_rod:
         del base["axis"]
-        base["rod"], first = "L", [turning(normal, below)]
-    elif base_letter == "U":
-        first = [first[0], turning(normal, below)]
-    if letter == "U":
-        last = [turning(normal, above), last[0]]
-    screws = [*first, np.concatenate([delta, np.zeros(3)]), *last]
+        base["rod"] = "L"
+    screws = [*lower, np.concatenate([delta, np.zeros(3)]), *_inwards(letter, upper)]
     table = {"base": base, "platform": platform}
     spins = base_letter == letter == "S"
     if rng.random() < 0.8:
         table |= {"cylinder": body(rng, spins=spins), "piston": body(rng, spins=spins)}
-    return Leg(kind, screws, len(first), length, None if line is None else 0, table=table)
+    return Leg(kind, screws, len(lower), length, 0 if on_rod else None, table=table)
+
+
+def _slider(
+    rng: np.random.Generator, style: str, kind: str, home: Array, lines: Lines, others: list[Leg]
+) -> Leg:
+    """A leg on a rail, which is the line below if there is one."""
+    turn, o = home[:3, :3], home[:3, 3]
+    _, base_letter, letter = kind
+    for _ in range(TRIES):
+        foot, local = _on(rng, style, 0.9, lines.base), _on(rng, style, 0.5, lines.platform)
+        rail = _axis(rng, style) if lines.base is None else lines.base[1]
+        place = float(rng.choice([-0.5, 0.0, 0.5]) if style == "aligned" else rng.uniform(-0.5, 0.5))
+        r = o + turn @ local - foot
+        length = float(np.linalg.norm(r))
+        lean, across = unit(r) @ rail, float(np.linalg.norm(np.cross(unit(r), rail)))
+        if length > 0.4 and abs(lean) > 0.1 and across > 0.3 and _apart(foot - place * rail, local, others):
+            break
+    else:
+        raise NoRoom
+    delta, square = r / length, unit(np.cross(rail, r))
+    fault = str(rng.choice(FAULTS)) if rng.random() < FAULTY else None
+    if fault == "base.axis" and kind not in ("PRS", "PRU", "PUU"):
+        fault = None
+    base_letter = "F" if fault == "base.joint" else base_letter
+    letter = str(rng.choice(["R", "F"])) if fault == "platform.joint" else letter
+    held = base_letter == "R" or (base_letter == "U" and (letter == "U" or lines.base is not None))
+    held &= fault != "base.axis"
+    normal = square if held else rotation(delta * rng.uniform(0.3, 2.8)) @ square
+    base, lower = _joint(
+        rng, style, base_letter, foot, delta, normal, np.eye(3), foot, rail if held else None
+    )
+    platform, upper = _joint(rng, style, letter, local, delta, normal, turn, foot + r)
+    base["point"] = (foot - place * rail).tolist()
+    branch = 1.0 if lean > 0.0 else -1.0
+    strut = 0.95 * across * length if fault == "slider.strut" else length
+    table = {"base": base, "platform": platform}
+    table["slider"] = {"axis": (rail * rng.uniform(0.2, 5.0)).tolist(), "strut": strut, "branch": branch}
+    if rng.random() < 0.8:
+        table["strut"] = body(rng, spins=base_letter == letter == "S")
+        table["carriage"] = {"mass": float(rng.uniform(0.5, 3.0)), "center": rng.normal(size=3).tolist()}
+    screws = [np.concatenate([rail, np.zeros(3)]), *lower, *_inwards(letter, upper)]
+    return Leg(kind, screws, len(lower), place, slider=True, fault=fault, table=table)
 
 
 def _normal(rng: np.random.Generator, style: str, delta: Array) -> Array:
@@ -214,8 +322,9 @@ def _joint(
     normal: Array,
     turn: Array,
     at: Array,
+    along: Array | None = None,
 ) -> tuple[dict[str, Any], list[Array]]:
-    """The joint in its body's axes, and its screws; of a U joint the one that is fixed in the body."""
+    """The joint in its body's axes, and its screws from the body on; a U joint may have its axis given."""
     table: dict[str, Any] = {"joint": letter, "point": point.tolist()}
     size = rng.uniform(0.2, 5.0) * rng.choice([-1.0, 1.0])
     match letter:
@@ -225,7 +334,9 @@ def _joint(
             square = [a for a in np.eye(3) if abs(a @ normal) < 1e-12 and abs(a @ delta) < 0.9]
             angle = rng.uniform(0.5, np.pi - 0.5)
             axis = np.cos(angle) * delta + np.sin(angle) * np.cross(normal, delta)
-            if style == "aligned" and square:
+            if along is not None:
+                axis = along
+            elif style == "aligned" and square:
                 axis = square[rng.integers(len(square))]
         case "R":
             axis = normal
@@ -233,17 +344,13 @@ def _joint(
             table["normal"] = (turn.T @ normal * size).tolist()
             axis, size = delta, abs(size)
     table["axis"] = (turn.T @ axis * size).tolist()
-    return table, [] if letter == "F" else [turning(axis, at)]
+    screws = {"U": [turning(axis, at), turning(normal, at)], "R": [turning(axis, at)], "F": []}
+    return table, screws[letter]
 
 
-def _actuate(rng: np.random.Generator, drawn: Drawn) -> None:
-    """As many legs as there are freedoms, if there are as many; now and then another number."""
-    dof = Mobility.of(drawn).dof
-    number = dof if rng.random() < 0.9 else int(rng.integers(0, len(drawn.legs) + 1))
-    chosen = rng.permutation(len(drawn.legs))[:number]
-    for i, leg in enumerate(drawn.legs):
-        leg.actuated = i in chosen
-        leg.table["actuated"] = bool(leg.actuated)
+def _inwards(letter: str, screws: list[Array]) -> list[Array]:
+    """From the leg to the body."""
+    return screws[::-1] if letter == "U" else screws
 
 
 def body(rng: np.random.Generator, *, spins: bool = False) -> dict[str, Any]:
@@ -254,264 +361,3 @@ def body(rng: np.random.Generator, *, spins: bool = False) -> dict[str, Any]:
     if spins:
         center[[0, 2]], inertia = 0.0, np.diag([0.03, 0.01, 0.03])
     return {"mass": float(masses.sum()), "center": center.tolist(), "inertia": inertia.tolist()}
-
-
-# --- screws -------------------------------------------------------------------------------------------------
-
-
-def skew(v: Array) -> Array:
-    x, y, z = v
-    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-
-
-def rotation(vector: Array) -> Array:
-    angle = float(np.linalg.norm(vector))
-    if angle < 1e-300:
-        return np.eye(3)
-    k = skew(vector / angle)
-    return np.eye(3) + np.sin(angle) * k + (1 - np.cos(angle)) * k @ k
-
-
-def rotation_vector(turn: Array) -> Array:
-    """Of a turn of less than half a circle."""
-    axis = np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]]) / 2
-    sine, cosine = float(np.linalg.norm(axis)), (np.trace(turn) - 1) / 2
-    return axis * (np.arctan2(sine, cosine) / sine if sine > 1e-12 else 1.0)
-
-
-def turning(axis: Array, point: Array) -> Array:
-    """The screw of a turn about a line."""
-    return np.concatenate([np.cross(point, axis), axis])
-
-
-def skews(v: Array) -> Array:
-    """(n, 3, 3) of (n, 3)."""
-    out = np.zeros((len(v), 3, 3))
-    out[:, 2, 1], out[:, 0, 2], out[:, 1, 0] = v.T
-    return out - np.swapaxes(out, 1, 2)
-
-
-def exponentials(screws: Array, values: Array) -> Array:
-    """(n, 4, 4): displacements of joints with these screws, turns about unit axes or pure translations."""
-    v, k = screws[:, :3], skews(screws[:, 3:])
-    turns = np.eye(3) + np.sin(values)[:, None, None] * k + (1 - np.cos(values))[:, None, None] * (k @ k)
-    points = (k @ v[:, :, None])[:, :, 0]
-    arcs = points - (turns @ points[:, :, None])[:, :, 0]
-    out = np.tile(np.eye(4), (len(values), 1, 1))
-    out[:, :3, :3] = turns
-    out[:, :3, 3] = np.where(screws[:, 3:].any(axis=1)[:, None], arcs, v * values[:, None])
-    return out
-
-
-def carried(screws: Array, by: Array) -> Array:
-    """(n, 6): screws that displacements (n, 4, 4) have carried along."""
-    w = (by[:, :3, :3] @ screws[:, 3:, None])[:, :, 0]
-    v = (by[:, :3, :3] @ screws[:, :3, None])[:, :, 0] + (skews(by[:, :3, 3]) @ w[:, :, None])[:, :, 0]
-    return np.hstack([v, w])
-
-
-# --- loops --------------------------------------------------------------------------------------------------
-
-
-def chains(drawn: Drawn, q: Array) -> tuple[list[Array], Array]:
-    """The platform's displacement by each leg, (4, 4); and all screws, (6 legs, joints), at joint values q.
-
-    q holds the rods' turns, then the joints of each leg.
-    """
-    screws = np.array([*drawn.rods, *(screw for leg in drawn.legs for screw in leg.screws)])
-    each = exponentials(screws, q)
-    before = np.tile(np.eye(4), (len(q), 1, 1))
-    ends, column = [], len(drawn.rods)
-    for leg in drawn.legs:
-        here = np.eye(4) if leg.rod is None else each[leg.rod]
-        for _ in leg.screws:
-            before[column] = here
-            here = here @ each[column]
-            column += 1
-        ends.append(here)
-    now, joints, column = carried(screws, before), np.zeros((6 * len(drawn.legs), len(q))), len(drawn.rods)
-    for i, leg in enumerate(drawn.legs):
-        rows, own = slice(6 * i, 6 * i + 6), slice(column, column + len(leg.screws))
-        joints[rows, own] = now[own].T
-        if leg.rod is not None:
-            joints[rows, leg.rod] = now[leg.rod]
-        column = own.stop
-    return ends, joints
-
-
-def count(drawn: Drawn) -> int:
-    """Number of joint values."""
-    return len(drawn.rods) + sum(len(leg.screws) for leg in drawn.legs)
-
-
-def slides(drawn: Drawn) -> NDArray[np.intp]:
-    """Entry of each leg's prismatic joint."""
-    first = len(drawn.rods) + np.cumsum([0, *(len(leg.screws) for leg in drawn.legs[:-1])])
-    return np.array([f + leg.slide for f, leg in zip(first, drawn.legs, strict=True)])
-
-
-def closures(drawn: Drawn, joints: Array) -> Array:
-    """(6 legs, joints + 6): joint rates and the platform's twist, of which each leg makes zero."""
-    return np.hstack([joints, np.tile(-np.eye(6), (len(drawn.legs), 1))])
-
-
-def positions(drawn: Drawn, number: int, reach: float = 0.25) -> list[Array]:
-    """Joint values near home with all loops closed; home itself is none of them."""
-    rng = np.random.default_rng([SEED, drawn.number, 1])
-    found: list[Array] = []
-    for _ in range(number + 3):
-        q = reach * rng.uniform(-1, 1, count(drawn))
-        if (closed := close(drawn, q)) is not None:
-            found.append(closed)
-        if len(found) == number:
-            break
-    return found or [np.zeros(count(drawn))]
-
-
-def close(drawn: Drawn, q: Array) -> Array | None:
-    """Joint values near q with all loops closed, by damped Gauss-Newton steps of least size."""
-    for _ in range(60):
-        ends, joints = chains(drawn, q)
-        left = inverse(ends[0])
-        error = np.concatenate([np.zeros(6), *(_screw_of(end @ left) for end in ends[1:])])
-        size = float(np.abs(error).max())
-        if size < 1e-13:
-            return q
-        # The first leg's end is the platform.
-        loops = joints - np.tile(joints[:6], (len(drawn.legs), 1))
-        u, s, vt = np.linalg.svd(loops, full_matrices=False)
-        keep = s > 1e-9 * s[0] if len(s) and s[0] > 0 else np.zeros(len(s), dtype=bool)
-        gain = np.where(keep, s / (s * s + min(size, 1.0) ** 2), 0.0)
-        step = -vt.T @ (gain * (u.T @ error))
-        q = q + step * min(1.0, 0.5 / max(float(np.abs(step).max()), 1e-300))
-    return None
-
-
-def inverse(pose: Array) -> Array:
-    out = np.eye(4)
-    out[:3, :3] = pose[:3, :3].T
-    out[:3, 3] = -pose[:3, :3].T @ pose[:3, 3]
-    return out
-
-
-def _screw_of(pose: Array) -> Array:
-    """A small displacement as a screw, to first order."""
-    return np.concatenate([pose[:3, 3], rotation_vector(pose[:3, :3])])
-
-
-# --- mobility -----------------------------------------------------------------------------------------------
-
-
-def rank(matrix: Array) -> int:
-    s = np.linalg.svd(matrix, compute_uv=False)
-    return int(np.sum(s > RANK * s[0])) if len(s) and s[0] > 0.0 else 0
-
-
-def clear(drawn: Drawn) -> bool:
-    """Whether the ranks are clear at all poses.
-
-    They are not where loops close as a double root, a leg at a dead point in every pose, say: such poses are
-    known to the square root of rounding, and so are the singular values there. The platform then feels a
-    freedom more than it has: `extent` counts those that it has.
-    """
-    for q in drawn.poses:
-        s = np.linalg.svd(closures(drawn, chains(drawn, q)[1]), compute_uv=False)
-        if np.any((s > 1e-11 * s[0]) & (s < 1e-5 * s[0])):
-            return False
-    return True
-
-
-def extent(drawn: Drawn) -> int:
-    """Freedoms of the platform from the poses that it has near home: in how many directions they lie."""
-    reach, moves = 0.02, []
-    for q in positions(drawn, 30, reach):
-        by = chains(drawn, q)[0][0]
-        moves.append([*((by @ drawn.home)[:3, 3] - drawn.home[:3, 3]), *rotation_vector(by[:3, :3])])
-    # Paths are bent by a fiftieth; double roots are known to 3e-7.
-    return int(np.sum(np.linalg.svd(np.array(moves), compute_uv=False) > 0.1 * reach))
-
-
-@dataclass(frozen=True)
-class Mobility:
-    """From ranks, at the poses where they are greatest."""
-
-    dof: int
-    passive: int
-    closure_rank: int
-    uncontrolled: int
-    """Freedoms left with all actuators locked."""
-
-    @classmethod
-    def of(cls, drawn: Drawn) -> Mobility:
-        found = [cls.at(drawn, q) for q in drawn.poses]
-        least = (
-            min(values)
-            for values in zip(
-                *((m.dof, m.passive, -m.closure_rank, m.uncontrolled) for m in found), strict=True
-            )
-        )
-        dof, passive, negative, uncontrolled = least
-        return cls(dof, passive, -negative, uncontrolled)
-
-    @classmethod
-    def at(cls, drawn: Drawn, q: Array) -> Mobility:
-        _, joints = chains(drawn, q)
-        matrix = closures(drawn, joints)
-        still = joints.shape[1] - rank(joints)
-        full = rank(matrix)
-        locked = [column for leg, column in zip(drawn.legs, slides(drawn), strict=True) if leg.actuated]
-        free = np.delete(matrix, locked, axis=1)
-        loose = free.shape[1] - rank(free) - (free.shape[1] - 6 - rank(free[:, :-6]))
-        return cls(matrix.shape[1] - full - still, still, full - 6, loose)
-
-
-# --- given mechanisms ---------------------------------------------------------------------------------------
-
-
-def of_geometry(geometry: dict[str, Any]) -> Drawn:
-    """The screws of a mechanism that is given by its points and axes, SI, as `mech.geometry` has them."""
-    home = np.eye(4)
-    home[:3, :3] = rotation(np.array(geometry["home"]["rotation_vector"]))
-    home[:3, 3] = geometry["home"]["position"]
-    turn = home[:3, :3]
-    rods = [turning(unit(np.array(rod["axis"])), np.array(rod["point"])) for rod in geometry["rods"]]
-    legs = []
-    for leg in geometry["legs"]:
-        base, platform = leg["base"], leg["platform"]
-        below, above = np.array(base["point"]), home[:3, 3] + turn @ np.array(platform["point"])
-        delta = unit(above - below)
-        rod = base["rod"]
-        own = None if rod is None else geometry["rods"][rod]["axis"]
-        axes = [
-            a and body @ unit(np.array(a))
-            for a, body in ((own or base["axis"], np.eye(3)), (platform["axis"], turn))
-        ]
-        letters = ("R" if rod is not None else base["joint"]), platform["joint"]
-        normal = next(
-            (
-                _of_axis(a, letter, delta)
-                for a, letter in zip(axes, ("U" if rod is not None else letters[0], letters[1]), strict=True)
-                if letter in "UR" and a is not None
-            ),
-            None,
-        )
-        lower = _screws(
-            "R" if rod is not None else letters[0], None if rod is not None else axes[0], normal, below
-        )
-        upper = _screws(letters[1], axes[1], normal, above)[::-1]
-        screws = [*lower, np.concatenate([delta, np.zeros(3)]), *upper]
-        kind = f"{letters[0]}P{letters[1]}"
-        legs.append(Leg(kind, screws, len(lower), float(np.linalg.norm(above - below)), rod, leg["actuated"]))
-    drawn = Drawn(0, "given", legs, rods, home, {})
-    drawn.poses = positions(drawn, POSES)
-    return drawn
-
-
-def _of_axis(axis: Array, letter: str, delta: Array) -> Array:
-    return axis if letter == "R" else unit(np.cross(axis, delta))
-
-
-def _screws(letter: str, axis: Array | None, normal: Array | None, at: Array) -> list[Array]:
-    """From the body inwards: the axis fixed in the body, then the leg's normal."""
-    axes = {"S": list(np.eye(3)), "U": [axis, normal], "R": [normal], "F": []}[letter]
-    return [turning(a, at) for a in axes if a is not None]

@@ -1,4 +1,4 @@
-"""Random mechanisms of all leg kinds against screws and loops in numpy, and against their twins in Pinocchio.
+"""Random mechanisms of all leg kinds against screws, loops and virtual power in numpy, and their twins.
 
 What becomes of one: `python tests/test_random_chains.py NUMBER`; of many, by leg kind: `... FIRST COUNT`.
 """
@@ -20,18 +20,39 @@ from polypod import SingularityKind, Status
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from random_chains import KINDS, ON_ROD, Drawn, Mobility, chains, clear, draw, extent, of_geometry, slides
+from random_chains import KINDS, ON_RAIL, ON_ROD, TELESCOPIC, draw
+from random_dynamics import state
+from random_screws import (
+    Drawn,
+    Mobility,
+    by,
+    chains,
+    clear,
+    extent,
+    of_geometry,
+    slides,
+    turning,
+    unfelt,
+    unit,
+)
 
 Array = NDArray[np.float64]
 
 FEW = 150
 MANY = 10_000
+"""From number 0 on, telescopic, and as many from `TELESCOPIC` on."""
 BATCHES = 40
 SAMPLE = 20
 """Of so many, one is held against its twin."""
 TWIN_POSES = 3
+FORCES = 1e-9
+"""Relative to the largest force: rounding, magnified by singular values and redundant closures."""
+LOAD = np.array([300.0, -200.0, -500.0, 20.0, 40.0, -30.0])
 UNCLEAR = "no clear rank"
 """Of these the freedoms alone are compared; there are not many."""
+MISFIT = "joints or struts do not fit the rail"
+LINE = 1e-8
+"""Share of a turn about an idle line that a leg may feel: rounding of ranks."""
 LENGTHS = 1e-10
 """Relative to the longest leg: loops are closed to 1e-13, nearly singular ones magnify that."""
 REGULAR = 1e-3
@@ -53,6 +74,11 @@ class Outcome:
     """Worst relative difference of inverse kinematics from the joints' own values."""
     returned: int = 0
     """Poses that forward kinematics found again from their lengths."""
+    forces: float | None = None
+    """Worst relative difference of active forces from those by virtual power."""
+    idle: int = 0
+    redundant: bool = False
+    """Whether more legs are actuated than it takes."""
     twin: float | None = None
     """Worst relative difference from the twin."""
 
@@ -60,7 +86,11 @@ class Outcome:
 def examine(number: int) -> Outcome:
     """Draws a mechanism and compares all that can be compared."""
     drawn = draw(number)
-    own, out = Mobility.of(drawn), Outcome(number, drawn.kinds)
+    out = Outcome(number, drawn.kinds)
+    if drawn.faults:
+        out.refused, out.wrong = faulty(drawn)
+        return out
+    own = Mobility.of(drawn)
     actuators = sum(leg.actuated for leg in drawn.legs)
     if not clear(drawn):
         out.refused, out.wrong = UNCLEAR, shaky(drawn)
@@ -71,31 +101,61 @@ def examine(number: int) -> Outcome:
         out.refused, out.wrong = refusal(error, own, actuators)
         return out
     found = mech.mobility()
-    if actuators < own.dof - len(found.idle):
-        out.wrong.append(f"loaded with {actuators} actuators for {own.dof} freedoms, {found.idle}")
+    out.idle, out.redundant = len(found.idle), mech.redundantly_actuated
     # What actuators do not hold, by screws: idle freedoms too.
-    left = found.uncontrolled + len(found.idle)
-    theirs = Mobility(found.dof, found.passive, found.closure_rank, left)
+    left = found.uncontrolled + out.idle
+    theirs = Mobility(found.dof, found.passive, found.closure_rank, left, out.idle)
     if theirs != own:
         out.wrong.append(f"mobility {theirs}, by screws {own}")
+    if actuators < own.dof - own.idle:
+        out.wrong.append(f"loaded with {actuators} actuators for {own}")
     if found.redundant != 6 * (len(drawn.legs) - 1) - own.closure_rank or found.joint_freedoms != sum(
         (len(leg.screws) for leg in drawn.legs), len(drawn.rods)
     ):
         out.wrong.append(f"{found.redundant} redundant closures, {found.joint_freedoms} freedoms of joints")
+    lines(mech, drawn, out)
     kinematics(mech, drawn, out)
+    power(mech, drawn, out)
     if number % SAMPLE == 0:
         dynamics(mech, drawn, out)
     return out
 
 
+def freedoms(drawn: Drawn) -> int:
+    """Those of the loaded mechanism, or what its refusal tells."""
+    try:
+        return pp.Mechanism.from_dict(drawn.data).dof
+    except pp.MechanismError as error:
+        said = re.search(r"(?:for|leave) (\d+) freedoms", str(error))
+        return int(said[1]) if said else 0
+
+
+def faulty(drawn: Drawn) -> tuple[str, list[str]]:
+    """What a mechanism with legs that no loader may take is refused for."""
+    try:
+        pp.Mechanism.from_dict(drawn.data)
+    except pp.MechanismError as error:
+        places = [fault.place for fault in error.faults]
+        return MISFIT, [] if places == drawn.faults else [f"refused: {error}"]
+    return "", [f"loaded in spite of {drawn.faults}"]
+
+
+def lines(mech: pp.Mechanism, drawn: Drawn, out: Outcome) -> None:
+    """Turns about the lines of idle freedoms are among the twists that no leg feels, at poses near home."""
+    for line in mech.mobility().idle:
+        axis, point = np.array(line.axis), np.array(line.point)
+        if line.body == "platform":
+            axis, point = drawn.home[:3, :3] @ axis, drawn.home[:3, :3] @ point + drawn.home[:3, 3]
+        turn = turning(axis, point)[:, None]
+        for end, twists in unfelt(drawn):
+            now = by(end, turn) if line.body == "platform" else turn
+            if not abs(now - twists @ (twists.T @ now)).max() < LINE:
+                out.wrong.append(f"legs feel the turn about the idle line {line}")
+
+
 def shaky(drawn: Drawn) -> list[str]:
     """What is wrong with the freedoms of a mechanism whose ranks are not clear."""
-    dof = extent(drawn)
-    try:
-        found = pp.Mechanism.from_dict(drawn.data).dof
-    except pp.MechanismError as error:
-        said = re.search(r"for (\d+) freedoms", str(error))
-        found = int(said[1]) if said else 0
+    dof, found = extent(drawn), freedoms(drawn)
     return [] if found == dof else [f"{found} freedoms, but poses in {dof} directions"]
 
 
@@ -106,7 +166,10 @@ def refusal(error: pp.MechanismError, own: Mobility, actuators: int) -> tuple[st
     said = re.match(r"(\d+) actuated legs for (\d+) freedoms.*; at least (\d+) legs", fault.message)
     if said:
         # Fewer are needed where freedoms are idle.
-        right = (int(said[1]), int(said[2])) == (actuators, own.dof) and actuators < int(said[3]) <= own.dof
+        needed = own.dof - own.idle
+        right = [int(n) for n in said.groups()] == [actuators, own.dof, needed] and actuators < needed
+    elif "are idle" in fault.message:
+        right = own.dof == own.idle > 0
     else:
         right = "leave the platform no freedom" in fault.message and own.dof == 0
     return reason, [] if right and not others else [
@@ -114,25 +177,53 @@ def refusal(error: pp.MechanismError, own: Mobility, actuators: int) -> tuple[st
     ]
 
 
+def leans(drawn: Drawn, q: Array, pose: Array) -> Array:
+    """(legs,): the part of each slider's strut along its rail, times its branch, m; none is 1."""
+    found = np.ones(len(drawn.legs))
+    for i, (leg, place) in enumerate(zip(drawn.legs, places(drawn, q), strict=True)):
+        if leg.slider:
+            rail, base = unit(np.array(leg.table["slider"]["axis"])), np.array(leg.table["base"]["point"])
+            above = pose[:3, :3] @ leg.table["platform"]["point"] + pose[:3, 3]
+            found[i] = leg.table["slider"]["branch"] * (rail @ (above - base) - place)
+    return found
+
+
+def places(drawn: Drawn, q: Array) -> Array:
+    """(legs,): leg lengths and places of carriages at joint values q."""
+    return np.array([leg.coordinate for leg in drawn.legs]) + q[slides(drawn)]
+
+
+def regular_at(mech: pp.Mechanism, poses: Array, least: float) -> NDArray[np.bool_]:
+    """Where rounding is magnified by less than 1/least: J is regular, and struts lean along their rails."""
+    found = mech.singularity(poses)
+    # Rows may depend on one another while redundant ones hold the platform: no answer, a kind of its own.
+    regular = (found.sigma_min > least) & (found.kind == SingularityKind.NONE)
+    return np.asarray(regular & (abs(found.transmission).min(axis=-1) > least))
+
+
 def kinematics(mech: pp.Mechanism, drawn: Drawn, out: Outcome) -> None:
     """Lengths are those of the prismatic joints, and lead back to a pose that has them."""
-    home = np.array([leg.length for leg in drawn.legs])
     poses = np.array([chains(drawn, q)[0][0] @ drawn.home for q in drawn.poses])
-    lengths = home + np.array([q[slides(drawn)] for q in drawn.poses])
+    own = np.array([places(drawn, q) for q in drawn.poses])
+    lean = np.array([leans(drawn, q, pose) for q, pose in zip(drawn.poses, poses, strict=True)])
+    sign = np.array([leg.table["slider"]["branch"] if leg.slider else 0.0 for leg in drawn.legs])
+    # A strut that has gone over to the other branch: its carriage has another place on that of the file.
+    lengths = own + 2.0 * sign * np.minimum(lean, 0.0)
+    size = abs(lengths).max(axis=1)
     found = mech.inverse_kinematics(poses)
-    out.lengths = float((abs(found.lengths - lengths).max(axis=1) / lengths.max(axis=1)).max())
+    # Where a strut is square to its rail, a place is known to the square root of rounding.
+    off = abs(found.lengths - lengths) * np.minimum(abs(lean), 1.0)
+    out.lengths = float((off.max(axis=1) / size).max())
     if not out.lengths < LENGTHS:
         out.wrong.append(f"lengths differ by {out.lengths:.2g}: {found.status}")
-    regular = mech.conditioning(poses).sigma_min > REGULAR
-    # Where rows depend on one another while redundant ones hold the platform: no answer, a kind of its own.
-    regular &= mech.singularity(poses).kind == SingularityKind.NONE
+    regular = regular_at(mech, poses, REGULAR)
     if not (found.status[regular] == Status.OK).all():
         out.wrong.append(f"inverse kinematics has status {found.status} at regular poses")
     back = mech.forward_kinematics(found.lengths, poses[np.arange(len(poses)) - 1])
     again = mech.inverse_kinematics(back.pose).lengths
     solved = (back.status == Status.OK) & mech.actuated.any()
     out.returned = int(solved.sum())
-    missed = abs(again - found.lengths)[:, mech.actuated].max(axis=1) / lengths.max(axis=1)
+    missed = abs(again - found.lengths)[:, mech.actuated].max(axis=1) / size
     if not (missed[solved] < LENGTHS).all():
         out.wrong.append(f"forward kinematics misses the lengths by {missed[solved].max():.2g}")
     # From the pose itself it must stay there.
@@ -140,6 +231,27 @@ def kinematics(mech: pp.Mechanism, drawn: Drawn, out: Outcome) -> None:
     gone = abs(stay.pose - poses).max(axis=(1, 2))[regular]
     if not ((stay.status[regular] == Status.OK) & (gone < 1e-9 / REGULAR)).all():
         out.wrong.append(f"forward kinematics leaves a regular pose: {stay.status}, {gone}")
+    over = regular & (lean[:, mech.actuated] < 0.0).any(axis=1)
+    other = mech.forward_kinematics(own, poses).status[over]
+    if not (other == Status.OTHER_BRANCH).all():
+        out.wrong.append(f"forward kinematics has status {other} where struts have gone over")
+
+
+def power(mech: pp.Mechanism, drawn: Drawn, out: Outcome) -> None:
+    """Active forces do the work on all motions that the loops allow; redundant ones are the least."""
+    rng = np.random.default_rng([11, out.number])
+    idle = [(line.body, np.array(line.axis)) for line in mech.mobility().idle]
+    for q in drawn.poses:
+        pose = chains(drawn, q)[0][0] @ drawn.home
+        if not (regular_at(mech, pose, TWIN_REGULAR) and (leans(drawn, q, pose) > 0.0).all()):
+            continue
+        own = state(drawn, q, idle, rng, LOAD)
+        found = mech.inverse_dynamics(own.pose, own.twist, own.acceleration, LOAD)
+        mine, theirs = [*own.forces, *own.torques], [*found.forces, *found.idle_torques]
+        off = float(abs(np.subtract(mine, theirs)).max() / abs(np.array(mine)).max())
+        out.forces = max(out.forces or 0.0, off)
+        if not (off < FORCES and found.status == Status.OK):
+            out.wrong.append(f"forces differ by {off:.2g} ({own.unbalanced:.1g}), status {found.status}")
 
 
 def dynamics(mech: pp.Mechanism, drawn: Drawn, out: Outcome) -> None:
@@ -154,12 +266,12 @@ def dynamics(mech: pp.Mechanism, drawn: Drawn, out: Outcome) -> None:
     spread = [{n: rng.uniform(-0.2, 0.2, 40) for n in names} for _ in range(3)]
     q = {n: middle.get(n, 0.0) + spread[0][n] for n in names}
     state = mech.state(q, spread[1], spread[2])
-    usable = (state.status == Status.OK) & (mech.conditioning(state.pose).sigma_min > TWIN_REGULAR)
+    usable = (state.status == Status.OK) & regular_at(mech, state.pose, TWIN_REGULAR)
     chosen = np.flatnonzero(usable)[:TWIN_POSES]
     if not len(chosen):
         return
     motion = (state.pose[chosen], state.twist[chosen], state.acceleration[chosen])
-    found = verify_states(mech, *motion, np.array([300.0, -200.0, -500.0, 20.0, 40.0, -30.0]))
+    found = verify_states(mech, *motion, LOAD)
     comparison = found.comparisons[0]
     out.twin = max(row.relative_max for row in comparison.rows)
     if not found.agrees or comparison.compared != len(chosen) or comparison.without_answer:
@@ -170,23 +282,31 @@ def dynamics(mech: pp.Mechanism, drawn: Drawn, out: Outcome) -> None:
 def table(outcomes: list[Outcome]) -> str:
     """Numbers by leg kind, as rows of a page."""
     rows = [
-        "| leg | drawn | refused | compared | worst length | twins | worst |",
-        "|---|---|---|---|---|---|---|",
+        "| leg | drawn | refused | compared | worst length | worst force | twins | worst |",
+        "|---|---|---|---|---|---|---|---|",
     ]
-    for kind in (*KINDS, *ON_ROD):
+    for kind in (*KINDS, *ON_ROD, *ON_RAIL):
         of = [out for out in outcomes if kind in out.kinds]
         loaded, twins = (
             [out for out in of if out.refused is None],
             [out for out in of if out.twin is not None],
         )
-        worst = (
-            max((out.lengths or 0.0 for out in loaded), default=0.0),
-            max((o.twin for o in twins), default=0.0),
-        )
-        numbers = f"{len(of)} | {len(of) - len(loaded)} | {len(loaded)} | {worst[0]:.1e} | {len(twins)}"
-        rows.append(f"| {kind} | {numbers} | {worst[1]:.1e} |")
+        worst = [
+            max((getattr(out, name) or 0.0 for out in loaded), default=0.0)
+            for name in ("lengths", "forces", "twin")
+        ]
+        numbers = f"{len(of)} | {len(of) - len(loaded)} | {len(loaded)} | {worst[0]:.1e} | {worst[1]:.1e}"
+        rows.append(f"| {kind} | {numbers} | {len(twins)} | {worst[2]:.1e} |")
     reasons = Counter(out.refused for out in outcomes if out.refused)
-    return "\n".join([*rows, "", *(f"{number} {reason}" for reason, number in reasons.items())])
+    special = Counter((out.idle, out.redundant) for out in outcomes if out.refused is None)
+    return "\n".join(
+        [
+            *rows,
+            "",
+            *(f"{number} {reason}" for reason, number in reasons.items()),
+            *(f"{number} with (idle freedoms, redundant legs) {kind}" for kind, number in special.items()),
+        ]
+    )
 
 
 def check(outcomes: list[Outcome]) -> None:
@@ -195,17 +315,36 @@ def check(outcomes: list[Outcome]) -> None:
     assert not wrong, "\n".join(wrong[:20])
 
 
+def counts(outcomes: list[Outcome]) -> Counter[str]:
+    """Compared mechanisms with each kind of leg."""
+    return Counter(kind for out in outcomes if out.refused is None for kind in set(out.kinds))
+
+
 def test_a_few_mechanisms() -> None:
     pytest.importorskip("pinocchio")
     outcomes = [examine(number) for number in range(FEW)]
     check(outcomes)
     # Every kind of leg was there, in mechanisms that were compared; both styles, refusals, twins.
-    compared = Counter(kind for out in outcomes if out.refused is None for kind in set(out.kinds))
-    assert set(compared) == {*KINDS, *ON_ROD}, compared
+    assert set(counts(outcomes)) == {*KINDS, *ON_ROD}, counts(outcomes)
     assert sum(out.refused is None for out in outcomes) > FEW / 3
     assert sum(out.refused is not None for out in outcomes) > FEW / 10
     assert sum(out.returned for out in outcomes) > FEW / 2
+    assert sum(out.forces is not None for out in outcomes) > FEW / 4
     assert sum(out.twin is not None for out in outcomes) > FEW / SAMPLE / 3
+
+
+def test_a_few_with_sliders_redundant_legs_and_idle_freedoms() -> None:
+    pytest.importorskip("pinocchio")
+    outcomes = [examine(number) for number in range(TELESCOPIC, TELESCOPIC + FEW)]
+    check(outcomes)
+    compared = [out for out in outcomes if out.refused is None]
+    assert set(counts(outcomes)) >= set(ON_RAIL), counts(outcomes)
+    assert len(compared) > FEW / 3
+    assert sum(out.refused == MISFIT for out in outcomes) > FEW / 50
+    assert sum(out.redundant for out in compared if out.forces is not None) > FEW / 10
+    assert sum(out.idle > 0 for out in compared if out.forces is not None) > FEW / 50
+    assert sum(out.returned for out in compared) > FEW / 2
+    assert sum(out.twin is not None for out in compared) > FEW / SAMPLE / 3
 
 
 def test_a_leg_that_points_backwards_has_no_answer() -> None:
@@ -259,22 +398,82 @@ def test_rows_that_are_independent_by_rounding_alone_are_not_taken() -> None:
     assert (mech.inverse_dynamics(poses, rest, rest).status == Status.OK).all()
 
 
+def test_idle_freedoms_are_found_beside_sliders() -> None:
+    """Five legs that end on a line: it needs no sixth."""
+    drawn = draw(10007)
+    assert Mobility.of(drawn).idle == 1
+    assert len(pp.Mechanism.from_dict(drawn.data).mobility().idle) == 1
+
+
+def test_struts_may_reach_their_rails_near_home_alone() -> None:
+    drawn = draw(13860)
+    own = Mobility.of(drawn)
+    assert (own.dof, own.uncontrolled) == (4, 0)
+    assert pp.Mechanism.from_dict(drawn.data).dof == own.dof
+
+
+@pytest.mark.parametrize("number", [14273, 15988])
+def test_mobility_is_that_of_the_mode_of_home(number: int) -> None:
+    """Others have fewer freedoms (14273), or a leg without length (15988)."""
+    drawn = draw(number)
+    assert freedoms(drawn) == Mobility.of(drawn).dof
+
+
+def test_legs_on_a_rod_may_end_in_one_point() -> None:
+    """Their planes are one whatever the pose: that they keep their angle is no constraint."""
+    drawn = draw(10227)
+    own = Mobility.of(drawn)
+    assert (own.dof, own.idle) == (6, 3)
+    assert pp.Mechanism.from_dict(drawn.data).dof == own.dof
+
+
+def test_a_mechanism_with_idle_freedoms_alone_is_refused() -> None:
+    """Three RPS legs to one point: it turns about the point, and no leg moves it."""
+    legs = [
+        {"base": {"joint": "R", "point": point, "axis": axis}, "platform": {"joint": "S", "point": [0, 0, 0]}}
+        for point, axis in (([6, 0, 0], [0, 1, 0]), ([-3, 5, 0], [5, 3, 0]), ([-3, -5, 0], [1, 1, -0.8]))
+    ]
+    data = {"name": "ball", "units": {"length": "m"}, "home": {"position": [0, 0, 10]}, "legs": legs}
+    with pytest.raises(pp.MechanismError, match="all 3 freedoms of the platform are idle"):
+        pp.Mechanism.from_dict(data)
+
+
 @pytest.mark.slow
+@pytest.mark.parametrize("first", [0, TELESCOPIC])
 @pytest.mark.parametrize("batch", range(BATCHES))
-def test_many_mechanisms(batch: int) -> None:
+def test_many_mechanisms(batch: int, first: int) -> None:
     pytest.importorskip("pinocchio")
     count = MANY // BATCHES
-    check([examine(number) for number in range(batch * count, (batch + 1) * count)])
+    check([examine(number) for number in range(first + batch * count, first + (batch + 1) * count)])
 
 
 @pytest.mark.parametrize(
     ("name", "dof", "passive"),
-    [("3-rps", 3, 0), ("tsai-6-sps", 6, 6), ("exechon", 3, 0), ("3-upu", 3, 0), ("2upr-rpu", 3, 0)],
+    [
+        ("3-rps", 3, 0),
+        ("tsai-6-sps", 6, 6),
+        ("exechon", 3, 0),
+        ("3-upu", 3, 0),
+        ("2upr-rpu", 3, 0),
+        ("hexaglide", 6, 0),
+        ("3-prs", 3, 0),
+        ("3-puu", 3, 0),
+        ("4pss-upu", 5, 4),
+    ],
 )
 def test_screws_give_the_freedoms_of_the_catalogue(name: str, dof: int, passive: int) -> None:
     """The numpy side by itself, on mechanisms whose freedoms are known."""
     found = Mobility.of(of_geometry(pp.load(name).geometry))
-    assert (found.dof, found.passive) == (dof, passive)
+    assert (found.dof, found.passive, found.idle) == (dof, passive, 0)
+
+
+@pytest.mark.parametrize(
+    ("name", "dof", "idle"),
+    [("pentapod-5-ups", 6, 1), ("pentapod-5-spu", 6, 1), ("linuxcnc-pentakins", 6, 1), ("4-rpr", 3, 0)],
+)
+def test_screws_give_the_idle_freedoms_of_the_catalogue(name: str, dof: int, idle: int) -> None:
+    found = Mobility.of(of_geometry(pp.load(name).geometry))
+    assert (found.dof, found.idle, found.uncontrolled) == (dof, idle, idle)
 
 
 if __name__ == "__main__":

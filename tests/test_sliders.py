@@ -64,6 +64,18 @@ def test_pinocchio_agrees(name, axes):
     assert wanted <= {row.quantity for row in comparison.rows}
 
 
+@pytest.mark.parametrize("name", NAMES)
+def test_struts_without_mass_are_followed_at_their_platform_joints(name):
+    """As links of telescopic legs are at their ends, by the core and by the twin."""
+    pytest.importorskip("pinocchio")
+    tables = sliders.tables(name)
+    for leg in tables["legs"]:
+        leg.pop("strut", None)
+    found = verify_states(pp.Mechanism.from_dict(tables), *states(name), LOAD)
+    assert found.comparisons[0].compared == COUNT
+    assert not exceeding(found)
+
+
 @pytest.mark.parametrize("engine", ["exudyn", "mujoco"])
 @pytest.mark.parametrize("name", NAMES)
 def test_engines_that_are_given_forces_agree(name, engine):

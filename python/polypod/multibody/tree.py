@@ -286,9 +286,9 @@ def _slider(
         # It does not turn, so that its inertia is of no effect; but engines want some.
         side = CARRIAGE * float(leg["slider"]["strut"])
         carriage = {**carriage, "inertia": carriage["mass"] * side**2 * np.eye(3)}
-    if strut is not None:
-        # The file counts from the platform joint.
-        strut = {**strut, "center": strut["center"] + _leg_ends(leg)[0]}
+    # The file counts from the platform joint, where a strut without mass has its point.
+    strut = strut or {"mass": 0.0, "center": np.zeros(3), "inertia": np.zeros((3, 3))}
+    strut = {**strut, "center": strut["center"] + _leg_ends(leg)[0]}
     rail = (Freedom("prismatic", unit(leg["slider"]["axis"])),)
     turns = _base_freedoms(leg["base"], zero[parts.piston])
     return [
