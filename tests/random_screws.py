@@ -19,6 +19,8 @@ POSES = 3
 """At which a mechanism's freedoms are counted: at a singular one a rank is less."""
 IDLE_POSES = 8
 """At which twists that no leg feels are held against one another."""
+IDLE_REACH = 0.03
+"""From farther off loops close in other modes, and with struts on the other side."""
 RANK = 1e-7
 """Singular values below this part of the largest are zero: poses are known to 1e-12."""
 COMMON = 1e-6
@@ -296,7 +298,7 @@ def moves(drawn: Drawn, joints: Array) -> Array:
 def unfelt(drawn: Drawn) -> list[tuple[Array, Array]]:
     """The platform's displacements (4, 4) at some poses, and its twists (6, k) there that no leg feels."""
     found = []
-    for q in positions(drawn, IDLE_POSES):
+    for q in positions(drawn, IDLE_POSES, IDLE_REACH):
         ends, joints = chains(drawn, q)
         found.append((ends[0], moves(drawn, np.delete(joints, slides(drawn), axis=1))))
     least = min(twists.shape[1] for _, twists in found)

@@ -126,8 +126,8 @@ def freedoms(drawn: Drawn) -> int:
     try:
         return pp.Mechanism.from_dict(drawn.data).dof
     except pp.MechanismError as error:
-        said = re.search(r"(?:for|leave) (\d+) freedoms", str(error))
-        return int(said[1]) if said else 0
+        said = re.search(r"(?:for|leave|all) (\d+) freedoms|(one) freedom", str(error))
+        return int(said[1] or 1) if said else 0
 
 
 def faulty(drawn: Drawn) -> tuple[str, list[str]]:
@@ -168,7 +168,7 @@ def refusal(error: pp.MechanismError, own: Mobility, actuators: int) -> tuple[st
         # Fewer are needed where freedoms are idle.
         needed = own.dof - own.idle
         right = [int(n) for n in said.groups()] == [actuators, own.dof, needed] and actuators < needed
-    elif "are idle" in fault.message:
+    elif "idle, so that no leg moves it" in fault.message:
         right = own.dof == own.idle > 0
     else:
         right = "leave the platform no freedom" in fault.message and own.dof == 0

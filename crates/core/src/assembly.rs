@@ -123,9 +123,12 @@ fn check_freedoms(mech: &Mechanism) -> Option<Fault> {
         return Some(Fault::new("legs", "together they leave the platform no freedom; release a joint"));
     }
     if idle == dof {
-        let message = format!(
-            "all {dof} freedoms of the platform are idle, so that no leg moves it; move a joint off the others"
-        );
+        let all = if dof == 1 {
+            "the one freedom of the platform is".to_owned()
+        } else {
+            format!("all {dof} freedoms of the platform are")
+        };
+        let message = format!("{all} idle, so that no leg moves it; move a joint off the others");
         return Some(Fault::new("legs", message));
     }
     let apart = match idle {

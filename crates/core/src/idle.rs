@@ -102,12 +102,14 @@ pub(crate) fn find(mech: &Mechanism, independent: &[Constraint], poses: &[Pose<f
         poses.iter().map(|pose| (*pose, unfelt(mech, independent, pose))).collect();
     let least = free.iter().map(|(_, twists)| twists.len()).min().unwrap_or(0);
     let generic: Vec<_> = free.into_iter().filter(|(_, twists)| twists.len() == least).collect();
+    // A line may be at rest in both bodies, and then counts as one of that body whose joints lie on it.
+    let mut lines: Vec<Idle> =
+        [Side::Platform, Side::Base].into_iter().flat_map(|side| fixed(mech, side, &generic)).collect();
+    lines.sort_by_key(|idle| idle.through.is_none());
     let mut found: Vec<Idle> = Vec::new();
-    for side in [Side::Platform, Side::Base] {
-        for idle in fixed(mech, side, &generic) {
-            if found.len() < least && is_new(mech, &found, &idle, &generic[0].0) {
-                found.push(idle);
-            }
+    for idle in lines {
+        if found.len() < least && is_new(mech, &found, &idle, &generic[0].0) {
+            found.push(idle);
         }
     }
     found

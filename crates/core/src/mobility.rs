@@ -1,8 +1,8 @@
 //! Mobility from ranks: which constraints are independent, how many loop closures are redundant and which legs they
 //! couple, which freedoms are passive \[T18\].
 //!
-//! Ranks are taken at several generic poses, reached from the home pose by steps of about a third of the
-//! mechanism's size, and the largest counts: at a singular pose a rank only drops.
+//! Ranks are taken at several generic poses near home, which the machine can have, and the largest counts: at a singular pose
+//! a rank only drops.
 
 use crate::constraint;
 use crate::draw::Draw;
