@@ -371,6 +371,7 @@ def test_workspace_by_a_lattice(run):
             "--fix axis_x is '2mm'; must be a number without a unit",
         ),
         (("--bounds", "z=2deg:3deg"), "--bounds z: 'deg' is no unit of length"),
+        (("--bounds", "z=400:950mm"), "both numbers need a unit, such as 400mm:950mm"),
         (
             ("--vary", "x,y,z", "--fix", "alpah=2deg"),
             "--fix: 'alpah' is no coordinate; did you mean \"alpha\"?",

@@ -334,3 +334,12 @@ def test_a_motion_near_it_is_told():
     near = [passage for passage in found["near"] if passage["kind"] == "STRUT_ACROSS_RAIL"]
     assert [passage["leg"] for passage in near] == ["6"]
     assert near[0]["minimum"] < found["threshold"]
+
+
+def test_a_strut_without_length_is_one_fault() -> None:
+    """Ranks of a machine that no strut holds would tell a second one, which is none."""
+    data = pp.load("hexaglide").to_dict()
+    data["legs"][0]["slider"]["strut"] = 0
+    with pytest.raises(pp.MechanismError) as error:
+        pp.Mechanism.from_dict(data)
+    assert [fault.place for fault in error.value.faults] == ["legs.1.slider.strut"]

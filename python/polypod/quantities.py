@@ -1,4 +1,4 @@
-"""Quantities as people type them: `20mm`, `alpha=10deg`, `z=0.2:900mm`; m and rad where there is no unit."""
+"""Quantities as people type them: `20mm`, `alpha=10deg`, `z=2mm:9mm`; m and rad where there is no unit."""
 
 from __future__ import annotations
 
@@ -71,6 +71,12 @@ def interval(option: str, text: str) -> tuple[str, tuple[float, float]]:
     if not (mark and colon and name):
         raise WorkspaceError(f"{option} is {text!r}; must be name=from:to, such as z=200mm:900mm")
     place, kind = f"{option} {name}", kind_of(option, name)
+    ends = [_parted(place, value, _EXAMPLES[kind]) for value in (low, high)]
+    units = sorted({unit for _, unit in ends})
+    if len(units) == 2 and not units[0]:
+        # One unit is easily meant for both, and the other number a thousand times off.
+        meant = ":".join(f"{number:g}{units[1]}" for number, _ in ends)
+        raise WorkspaceError(f"{place} is {values!r}; both numbers need a unit, such as {meant}")
     return name, (quantity(place, low, kind), quantity(place, high, kind))
 
 

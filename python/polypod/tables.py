@@ -291,7 +291,7 @@ def peaks_table(facts: Facts) -> Table:
     rows = [
         ("peak speed of o / mm/s", fixed(platform["peak_speed"], 1e3)),
         ("peak angular speed / rad/s", significant(platform["peak_angular_speed"])),
-        ("peak actuator power / W", fixed(power["peak_actuators"])),
+        ("peak power, all actuators / W", fixed(power["peak_actuators"])),
         ("residual of the power balance / W", significant(power["greatest_residual"], 1)),
         ("... relative to the power that flows", significant(power["relative_residual"], 1)),
         *_coupled_rows(facts["coupled"]),

@@ -39,7 +39,8 @@ pub fn assemble(spec: &Spec) -> Result<Mechanism, Vec<Fault>> {
     let (true, Some(home)) = (geometry_sound, home) else { return Err(faults) };
     let mut mech = build(spec, home);
     let off_home = check_home(&mech);
-    if off_home.is_empty() {
+    // Where a number is wrong the machine may be none that ranks tell anything about.
+    if off_home.is_empty() && (faults.is_empty() || mobility::is_possible(&mech, &mech.home)) {
         let (independent, idle, mobility) = mobility::analyse(&mech);
         (mech.independent, mech.idle) = (independent, idle);
         mech.mobility = mobility;

@@ -110,7 +110,7 @@ pub(crate) fn generic_poses(mech: &Mechanism) -> Vec<Pose<f64>> {
 }
 
 /// Whether every leg has a length, and every strut its rail within reach, with none backwards in a fixed joint.
-fn is_possible(mech: &Mechanism, pose: &Pose<f64>) -> bool {
+pub(crate) fn is_possible(mech: &Mechanism, pose: &Pose<f64>) -> bool {
     let has_length =
         |leg: &Leg| leg::position(leg, pose).length > RANK_TOLERANCE * mech.characteristic_length;
     let reaches = |leg: &Leg| leg::position(leg, pose).coordinate.is_finite();

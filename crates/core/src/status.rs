@@ -75,8 +75,9 @@ impl Status {
                  change them together, or use natural coordinates"
             }
             Status::Fold => {
-                "the coordinates are singular here: two branches meet (γ = 0 or 180°), so rates are not determined; \
-                 the mechanism need not be singular, natural coordinates may pass"
+                "the coordinates do not determine the motion here: two of their branches meet (of the paper's where γ = 0 or 180°), or \
+                 they depend on one another at every pose; the mechanism need not be singular, other coordinates may pass: \
+                 `polypod info` tells independent ones"
             }
             Status::NotConverged => {
                 "no pose was found from the guess; give a guess nearer to the pose or check that it exists"

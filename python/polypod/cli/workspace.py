@@ -64,7 +64,9 @@ def workspace(
     ] = None,
     bounds: Annotated[
         list[str] | None,
-        typer.Option(metavar="NAME=FROM:TO", help="Bounds of a coordinate, such as z=0.2:900mm; repeatable."),
+        typer.Option(
+            metavar="NAME=FROM:TO", help="Bounds of a coordinate, such as z=200mm:900mm; repeatable."
+        ),
     ] = None,
     branch: Annotated[int, typer.Option(help="Slice: +1 or -1, the sign of sin γ.")] = 1,
     keep_aspect: Annotated[
