@@ -19,7 +19,7 @@ POSES = 3
 """At which a mechanism's freedoms are counted: at a singular one a rank is less."""
 IDLE_POSES = 8
 """At which twists that no leg feels are held against one another."""
-IDLE_REACH = 0.03
+IDLE_REACH = 0.1
 """From farther off loops close in other modes, and with struts on the other side."""
 RANK = 1e-7
 """Singular values below this part of the largest are zero: poses are known to 1e-12."""

@@ -6,6 +6,7 @@ import asyncio
 import os
 import sys
 import warnings
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -41,7 +42,9 @@ def test_the_tour_runs(tour, tmp_path, monkeypatch):
         client = nbclient.NotebookClient(
             tour, timeout=120, kernel_name="python3", resources={"metadata": {"path": str(tmp_path)}}
         )
-        asyncio.run(client.async_execute())
+        # In a thread of its own: a browser that other tests have opened keeps a loop running in this one.
+        with ThreadPoolExecutor(1) as thread:
+            thread.submit(lambda: asyncio.run(client.async_execute())).result()
     code = [cell for cell in tour.cells if cell.cell_type == "code"]
     outputs = [output for cell in code for output in cell.outputs]
     assert not [o for o in outputs if o.output_type == "error"]

@@ -453,7 +453,7 @@ def _joint(
     elif rod is not None and letter != "R":
         faults.append(Fault(f"{place}.joint", f"is {letter}; on a rod it must be R"))
     if rod is not None and rod_names is not None and rod not in rod_names:
-        names = [name for name in rod_names if isinstance(name, str)]
+        names = [name for name in rod_names if isinstance(name, str) and name.isprintable() and name.strip()]
         faults.append(Fault(f"{place}.rod", f"is {shown(rod)}, no rod's name; {alternatives(rod, names)}"))
         return None
     return {
