@@ -450,7 +450,8 @@ def scaled_all(rng: random.Random, data: Any) -> Any:
             return {k: walk(v, k in keys or (inside and k != "angle")) for k, v in value.items()}
         if isinstance(value, list):
             return [walk(v, inside) for v in value]
-        return value * factor if inside and _is_number(value) else value
+        # Integers from other changes may be too large for a factor.
+        return value * factor if inside and _is_number(value) and abs(value) < 1e300 else value
 
     return walk(data, False)
 
