@@ -6,9 +6,13 @@ mod common;
 use std::hint::black_box;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
-use polypod_core::real::{Dual, Real};
+use polypod_core::dynamics::forward_dynamics;
+use polypod_core::dynamics::inverse_dynamics;
+use polypod_core::forward_kinematics::newton;
+use polypod_core::kinematics::jacobian;
+use polypod_core::kinematics::leg;
+use polypod_core::number::real::{Dual, Real};
 use polypod_core::spatial::{Acceleration, Motion, Pose, Twist, Vec3, Wrench};
-use polypod_core::{dynamics, forward, forward_dynamics, jacobian, leg};
 
 /// Different states in turn, so that nothing is learnt from the last one.
 const STATES: usize = 64;
@@ -45,7 +49,7 @@ fn kernels(criterion: &mut Criterion) {
         black_box(jacobian::hessian(&mech, &s.pose));
     });
     measure("inverse dynamics", &|s| {
-        black_box(dynamics::inverse_dynamics(&mech, s, mech.load.wrench));
+        black_box(inverse_dynamics::inverse_dynamics(&mech, s, mech.load.wrench));
     });
     measure("forward dynamics", &|s| {
         let forces = black_box([100.0; 5]);
@@ -54,12 +58,12 @@ fn kernels(criterion: &mut Criterion) {
     measure("forward kinematics from a guess 1 mm off", &|s| {
         let mut lengths: Vec<f64> = mech.legs.iter().map(|leg| leg::position(leg, &s.pose).length).collect();
         lengths[0] += 1e-3;
-        black_box(forward::forward_kinematics(&mech, &lengths, &s.pose));
+        black_box(newton::forward_kinematics(&mech, &lengths, &s.pose));
     });
     measure("inverse dynamics and one derivative", &|s| {
         let platform = lifted::<Dual<f64>>(s);
         let load = Wrench::new(Vec3::lift(mech.load.wrench.force), Vec3::lift(mech.load.wrench.torque));
-        black_box(dynamics::inverse_dynamics(&mech, &platform, load));
+        black_box(inverse_dynamics::inverse_dynamics(&mech, &platform, load));
     });
     group.finish();
 }

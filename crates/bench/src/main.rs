@@ -12,15 +12,15 @@ use std::hint::black_box;
 use std::ops::{Add, Div, Mul, Neg, Sub};
 use std::time::Instant;
 
-use polypod_core::dynamics::inverse_dynamics;
-use polypod_core::forward::{Asked, step_of, system};
-use polypod_core::forward_dynamics::forward_dynamics;
-use polypod_core::jacobian::jacobian;
-use polypod_core::lanes::{Lanes, Task, dispatch};
-use polypod_core::leg;
-use polypod_core::linear::solve;
-use polypod_core::mechanism::Mechanism;
-use polypod_core::real::{Ordered, Real, Trig};
+use polypod_core::dynamics::forward_dynamics::forward_dynamics;
+use polypod_core::dynamics::inverse_dynamics::inverse_dynamics;
+use polypod_core::forward_kinematics::newton::{Asked, step_of, system};
+use polypod_core::kinematics::jacobian::jacobian;
+use polypod_core::kinematics::leg;
+use polypod_core::model::mechanism::Mechanism;
+use polypod_core::number::lanes::{Lanes, Task, dispatch};
+use polypod_core::number::real::{Ordered, Real, Trig};
+use polypod_core::numerics::gauss::solve;
 use polypod_core::spatial::{Acceleration, Motion, Pose, Twist, Vec3, Wrench};
 use serde_json::json;
 

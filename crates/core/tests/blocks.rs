@@ -9,11 +9,11 @@ use std::time::Instant;
 
 use common::{published, states};
 use polypod_core::batch::{self, Coordinates, Loads, States, Table};
-use polypod_core::coordinates::{self, Set};
-use polypod_core::dynamics;
-use polypod_core::mechanism::Mechanism;
+use polypod_core::dynamics::inverse_dynamics;
+use polypod_core::kinematics::coordinate_sets::{self, Set};
+use polypod_core::model::mechanism::Mechanism;
+use polypod_core::parallel::threads;
 use polypod_core::spatial::Motion;
-use polypod_core::threads;
 
 /// The system's allocator, which counts.
 struct Counting;
@@ -78,7 +78,7 @@ const OPERATIONS: [(&str, Operation); 17] = [
     ("joint reactions", |mech, a| batch::joint_reactions(mech, &a.states(), &Loads::Own, 1.0)),
     ("derivatives", |mech, a| {
         let set = Set::of(mech)[0];
-        let given = coordinates::best_given(mech, &set);
+        let given = coordinate_sets::best_given(mech, &set);
         batch::inverse_dynamics_derivatives(mech, &a.states(), &Loads::Own, &set, &given)
     }),
     ("regressor", |mech, a| batch::regressors(mech, &a.states(), &Loads::Own)),
@@ -114,7 +114,7 @@ fn no_state_allocates_and_blocks_are_faster_than_single_states() {
     let load = mech.load.wrench;
     let one_by_one = || {
         for state in &many {
-            black_box(dynamics::inverse_dynamics(&mech, black_box(state), load));
+            black_box(inverse_dynamics::inverse_dynamics(&mech, black_box(state), load));
         }
     };
     let in_blocks = || {

@@ -4,9 +4,9 @@ mod common;
 
 use common::{mechanisms, states};
 use polypod_core::batch::{self, Coordinates};
-use polypod_core::coordinates::{self, Set};
-use polypod_core::mechanism::Mechanism;
-use polypod_core::status::Status;
+use polypod_core::kinematics::coordinate_sets::{self, Set};
+use polypod_core::model::mechanism::Mechanism;
+use polypod_core::model::status::Status;
 
 /// Relative to one, or to the number.
 const ROUNDING: f64 = 1e-8;
@@ -15,7 +15,7 @@ const ROUNDING: f64 = 1e-8;
 fn series(mech: &Mechanism, set: &Set, count: usize) -> Vec<[Vec<f64>; 3]> {
     let mut series = vec![[(); 3].map(|()| Vec::new()); set.names().len()];
     for (i, motion) in states(mech, count, 17).iter().enumerate() {
-        let q = coordinates::along(mech, set, motion);
+        let q = coordinate_sets::along(mech, set, motion);
         for (k, [x, d, dd]) in series.iter_mut().enumerate() {
             x.push(match (set, i, k) {
                 (_, 1, 0) => f64::NAN,
@@ -41,7 +41,7 @@ fn states_of_many_coordinates_are_those_of_each() {
         for set in Set::of(&mech) {
             let all = series(&mech, &set, count);
             // The least that must be given, and all that may be: γ of the paper's set is never.
-            let least = coordinates::best_given(&mech, &set);
+            let least = coordinate_sets::best_given(&mech, &set);
             let most = vec![true; all.len()];
             for given in if matches!(set, Set::Paper(_)) { vec![least] } else { vec![least, most] } {
                 for branch in [1.0, -1.0] {

@@ -4,16 +4,16 @@ mod common;
 
 use common::{Draw, every_leg, on_rod, published, six_sliders, states, with_leg, with_leg_backwards};
 use polypod_core::batch::{self, Coordinates, Loads, States};
-use polypod_core::coordinates::{self, MAX_COORDINATES, Set, Values};
-use polypod_core::forward::{asked, error, forward_kinematics, polish, step_of};
-use polypod_core::jacobian::scaled_jacobian;
-use polypod_core::leg;
-use polypod_core::linear::solve;
-use polypod_core::mechanism::Mechanism;
-use polypod_core::modes::{Modes, assembly_modes, start};
-use polypod_core::singularity::TOLERANCE;
+use polypod_core::forward_kinematics::assembly_modes::{Modes, assembly_modes, start};
+use polypod_core::forward_kinematics::newton::{asked, error, forward_kinematics, polish, step_of};
+use polypod_core::kinematics::coordinate_sets::{self, MAX_COORDINATES, Set, Values};
+use polypod_core::kinematics::jacobian::scaled_jacobian;
+use polypod_core::kinematics::leg;
+use polypod_core::mobility::singularity::TOLERANCE;
+use polypod_core::model::mechanism::Mechanism;
+use polypod_core::model::status::Status;
+use polypod_core::numerics::gauss::solve;
 use polypod_core::spatial::{Mat3, Pose, Vec3};
-use polypod_core::status::Status;
 
 fn lengths(mech: &Mechanism, pose: &Pose<f64>) -> Vec<f64> {
     mech.actuated().map(|(_, l)| leg::position(l, pose).coordinate).collect()
@@ -108,8 +108,8 @@ fn newton_converges_quadratically() {
     let mut guess = set.pose(&mech, &[0.13, -0.28, 0.61, 0.77, 0.63, 0.0, 0.0]);
     let mut errors = vec![apart(&guess, &pose)];
     while errors.last().is_some_and(|e| *e > 1e-9) && errors.len() < 10 {
-        let polypod_core::forward::System { residual, matrix } =
-            polypod_core::forward::system(&mech, &guess, &target);
+        let polypod_core::forward_kinematics::newton::System { residual, matrix } =
+            polypod_core::forward_kinematics::newton::system(&mech, &guess, &target);
         let step = solve(matrix, residual.map(|f| -f)).x;
         guess = guess.stepped(&step_of(&mech, step, 1.0));
         errors.push(apart(&guess, &pose));
@@ -285,7 +285,7 @@ fn a_pose_with_a_leg_backwards_in_a_fixed_joint_is_none() {
             assert_eq!(table.status, [Status::Ok, none, third], "{letters}: {name}");
         }
         let (numbers, zero) = (Set::Pose.values(&mech, &backwards).map(|x| [x]), [0.0]);
-        let free = coordinates::best_given(&mech, &Set::Pose);
+        let free = coordinate_sets::best_given(&mech, &Set::Pose);
         let guess = backwards.matrix();
         for (all, guess) in [(true, None), (true, Some(&guess[..])), (false, Some(&guess))] {
             let series = |k: usize| (all || free[k]).then_some([&numbers[k][..], &zero, &zero]);

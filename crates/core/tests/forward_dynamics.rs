@@ -4,12 +4,12 @@
 mod common;
 
 use common::{close, mechanisms, states};
-use polypod_core::chart::Chart;
-use polypod_core::constraint;
-use polypod_core::dynamics;
-use polypod_core::forward_dynamics::{forward_dynamics, platform_equations};
-use polypod_core::mechanism::Mechanism;
-use polypod_core::real::{Dual, F, Real};
+use polypod_core::dynamics::forward_dynamics::{forward_dynamics, platform_equations};
+use polypod_core::dynamics::inverse_dynamics;
+use polypod_core::kinematics::chart::Chart;
+use polypod_core::kinematics::constraint;
+use polypod_core::model::mechanism::Mechanism;
+use polypod_core::number::real::{Dual, F, Real};
 use polypod_core::spatial::{Acceleration, Mat3, Motion, Pose, Twist, Vec3, Wrench};
 
 /// Relative, for numbers by two routes in double precision.
@@ -28,7 +28,7 @@ fn accelerations_of_the_forces_of_a_motion_are_its_own() {
         for Motion { pose, twist, acceleration } in states(&mech, 6, 5) {
             let load = mech.load.wrench;
             let motion = Motion { pose, twist, acceleration };
-            let (f, _) = dynamics::inverse_dynamics(&mech, &motion, load);
+            let (f, _) = inverse_dynamics::inverse_dynamics(&mech, &motion, load);
             let found = forward_dynamics(&mech, &pose, &twist, &f[..mech.dof()], load);
             close(found.acceleration.a, acceleration.a, EXACT, &mech.name);
             close(found.acceleration.eps, acceleration.eps, EXACT, &mech.name);
@@ -72,7 +72,7 @@ fn the_terms_add_up_to_the_resultant() {
             let e = platform_equations(&mech, &pose, &twist);
             let (v, a) = (twist.array(), acceleration.array());
             let motion = Motion { pose, twist, acceleration };
-            let known = dynamics::resultant(&mech, &motion, Wrench::zero()).array();
+            let known = inverse_dynamics::resultant(&mech, &motion, Wrench::zero()).array();
             let size = known.iter().fold(1.0_f64, |m, x| m.max(x.abs()));
             for i in 0..6 {
                 let sum: f64 =

@@ -3,9 +3,9 @@
 mod common;
 
 use common::published;
-use polypod_core::coordinates::Set;
-use polypod_core::lanes;
-use polypod_core::lattice::{Lattice, Reached};
+use polypod_core::kinematics::coordinate_sets::Set;
+use polypod_core::number::lanes;
+use polypod_core::workspace::length_lattice::{Lattice, Reached};
 
 fn reached(set: &str) -> Reached {
     assert!(lanes::use_instructions(set));

@@ -4,14 +4,14 @@
 mod common;
 
 use common::{Draw, close, every_leg, mechanisms, moving, on_rod, parts, published, states, with_leg};
-use polypod_core::constraint;
-use polypod_core::coordinates::Set;
-use polypod_core::dynamics;
-use polypod_core::jacobian;
-use polypod_core::leg;
-use polypod_core::mechanism::Mechanism;
-use polypod_core::quadratic;
-use polypod_core::real::{Dual, F, Real, Scalar};
+use polypod_core::dynamics::inverse_dynamics;
+use polypod_core::kinematics::constraint;
+use polypod_core::kinematics::coordinate_sets::Set;
+use polypod_core::kinematics::jacobian;
+use polypod_core::kinematics::leg;
+use polypod_core::kinematics::quadratic_forms;
+use polypod_core::model::mechanism::Mechanism;
+use polypod_core::number::real::{Dual, F, Real, Scalar};
 use polypod_core::spatial::{Acceleration, Mat3, Motion, Pose, Twist, Vec3, Wrench};
 
 /// Relative, for second derivatives by two routes in double precision.
@@ -169,9 +169,9 @@ fn rows_and_hessians_are_the_derivatives_of_values() {
             state.acceleration = Acceleration::new(draw.vector(), draw.vector());
             let jet = moving(&state);
             let v = state.twist.array();
-            let total = |row: Wrench<f64>, h: &quadratic::Hessian<f64>| {
+            let total = |row: Wrench<f64>, h: &quadratic_forms::Hessian<f64>| {
                 let a = Twist::new(state.acceleration.a, state.acceleration.eps);
-                Vec3::new(row.power(&state.twist), row.power(&a) + quadratic::quadratic(h, &v), 0.0)
+                Vec3::new(row.power(&state.twist), row.power(&a) + quadratic_forms::quadratic(h, &v), 0.0)
             };
             for c in &mech.constraints {
                 let g = constraint::value(c, &jet);
@@ -191,7 +191,7 @@ fn rows_and_hessians_are_the_derivatives_of_values() {
     }
 }
 
-fn symmetric(h: &quadratic::Hessian<f64>) {
+fn symmetric(h: &quadratic_forms::Hessian<f64>) {
     for i in 0..6 {
         for j in 0..i {
             assert!((h[i][j] - h[j][i]).abs() <= 1e-14, "h[{i}][{j}]");
@@ -236,7 +236,7 @@ fn inertial_wrenches_are_rates_of_momentum() {
                 parts(moving.rotation * (inertia * moving.rotation.transpose_mul(spin)));
             let force = (mech.gravity - center[2]) * body.mass;
             let damping = Wrench::new(state.twist.v * mech.linear_damping, omega * mech.angular_damping);
-            let found = dynamics::platform_wrench(&mech, &state) + damping;
+            let found = inverse_dynamics::platform_wrench(&mech, &state) + damping;
             close(found.force, force, EXACT, "force");
             let torque = (center[0] - state.pose.o).cross(force) - momentum_rate;
             close(found.torque, torque, EXACT, "torque");
@@ -250,12 +250,12 @@ fn inertial_wrenches_are_rates_of_momentum() {
 fn power_balances() {
     for mech in mechanisms() {
         for state in samples(&mech) {
-            let load = dynamics::load_in_base(mech.load.wrench, mech.load.axes, &state.pose);
-            let (f, _) = dynamics::inverse_dynamics(&mech, &state, load);
+            let load = inverse_dynamics::load_in_base(mech.load.wrench, mech.load.axes, &state.pose);
+            let (f, _) = inverse_dynamics::inverse_dynamics(&mech, &state, load);
             let rates =
                 jacobian::jacobian(&mech, &state.pose).map(|row| Wrench::from_array(row).power(&state.twist));
             let actuators: f64 = f.iter().zip(&rates).take(mech.dof()).map(|(f, r)| f * r).sum();
-            let own = load + dynamics::platform_wrench(&mech, &state);
+            let own = load + inverse_dynamics::platform_wrench(&mech, &state);
             let (kinetic, potential) = energy_rates(&mech, &state);
             let damping = -(mech.linear_damping * state.twist.v.dot(state.twist.v)
                 + mech.angular_damping * state.twist.omega.dot(state.twist.omega));
@@ -279,7 +279,7 @@ fn energy_rates(mech: &Mechanism, state: &Motion<f64>) -> (f64, f64) {
         dual(state.twist.v, state.acceleration.a),
         dual(state.twist.omega, state.acceleration.eps),
     );
-    let (kinetic, potential) = dynamics::energy(mech, &pose, &twist);
+    let (kinetic, potential) = inverse_dynamics::energy(mech, &pose, &twist);
     (kinetic.d, potential.d)
 }
 
@@ -291,7 +291,7 @@ fn forces<T: Scalar>(mech: &Mechanism, state: &Motion<f64>) -> [f64; 6] {
         acceleration: Acceleration::new(lift(state.acceleration.a), lift(state.acceleration.eps)),
     };
     let load = Wrench::new(lift(mech.load.wrench.force), lift(mech.load.wrench.torque));
-    let (result, _) = dynamics::inverse_dynamics(mech, &platform, load);
+    let (result, _) = inverse_dynamics::inverse_dynamics(mech, &platform, load);
     result.map(Real::value)
 }
 
@@ -331,7 +331,7 @@ fn duals_differentiate_the_inverse_dynamics() {
             Acceleration::new(Vec3::lift(state.acceleration.a), Vec3::lift(state.acceleration.eps));
         let load = Wrench::new(Vec3::lift(mech.load.wrench.force), Vec3::lift(mech.load.wrench.torque));
         let platform = Motion { pose: Pose::lift(&state.pose), twist, acceleration };
-        let (exact, _) = dynamics::inverse_dynamics(&mech, &platform, load);
+        let (exact, _) = inverse_dynamics::inverse_dynamics(&mech, &platform, load);
         // Forces are quadratic in the twist: central differences are exact up to rounding.
         let (above, below) = (at(0.5), at(-0.5));
         let scale = exact.iter().fold(0.0_f64, |m, f| m.max(f.d.abs()));

@@ -6,13 +6,16 @@ use common::{mechanisms, moving, published, states};
 use std::sync::Arc;
 
 use polypod_core::batch::{self, Loads, States};
-use polypod_core::clearance::Hull;
-use polypod_core::dynamics;
-use polypod_core::joints::{self, Zero};
-use polypod_core::leg;
-use polypod_core::limits::{Bound, Limit, Measure, Strut, binding, margins};
-use polypod_core::mechanism::{Mechanism, Side};
-use polypod_core::spec::JointKind;
+use polypod_core::dynamics::inverse_dynamics;
+use polypod_core::kinematics::leg;
+use polypod_core::kinematics::passive_joints;
+use polypod_core::limits::margins::{binding, margins};
+use polypod_core::model::limit::Zero;
+use polypod_core::model::limit::{Bound, Limit, Measure, Strut};
+use polypod_core::model::mechanism::Mechanism;
+use polypod_core::model::spec::Axes;
+use polypod_core::model::spec::JointKind;
+use polypod_core::spatial::distance::Hull;
 
 fn limit(measure: Measure, bound: Bound) -> Limit {
     Limit { name: String::new(), measure, bound, scale: 1.0 }
@@ -24,20 +27,20 @@ fn pairs(mech: &Mechanism, state: &polypod_core::spatial::Motion<f64>) -> Vec<(M
     for (i, leg) in mech.legs.iter().enumerate() {
         let zero = Zero::of(leg, &mech.home);
         let s = leg::state(leg, state);
-        let both = joints::angles(leg, &zero, state, &s);
+        let both = passive_joints::angles(leg, &zero, state, &s);
         found.push((Measure::Length(i), [s.position.coordinate, s.end.rate]));
         for (side, at, joint) in
-            [(Side::Base, &both[0], &leg.base), (Side::Platform, &both[1], &leg.platform)]
+            [(Axes::Base, &both[0], &leg.base), (Axes::Platform, &both[1], &leg.platform)]
         {
             found.push((Measure::Cone(i, side), [at.cone, f64::NAN]));
-            let on_rod = side == Side::Base && leg.rod.is_some();
+            let on_rod = side == Axes::Base && leg.rod.is_some();
             if joint.kind == JointKind::Revolute || on_rod {
                 let k = usize::from(on_rod);
                 found.push((Measure::Angle(i, side, zero), [at.angles[k], at.rates[k]]));
             }
         }
         for (r, rod) in mech.rods.iter().enumerate().filter(|(_, rod)| rod.leader == i) {
-            let angle = joints::rod_angle(mech, r, &zero, s.frame.n());
+            let angle = passive_joints::rod_angle(mech, r, &zero, s.frame.n());
             found.push((Measure::RodAngle(r, zero), [angle, leg::rod_turn(rod.axis, &s).rate]));
         }
     }
@@ -159,8 +162,8 @@ fn margins_of_many_poses_are_those_of_each() {
         let count = mech.limits.len();
         let mut alone = vec![0.0; count];
         for (i, motion) in motions.iter().enumerate() {
-            let load = dynamics::load_in_base(mech.load.wrench, mech.load.axes, &motion.pose);
-            let (forces, _) = dynamics::inverse_dynamics(&mech, motion, load);
+            let load = inverse_dynamics::load_in_base(mech.load.wrench, mech.load.axes, &motion.pose);
+            let (forces, _) = inverse_dynamics::inverse_dynamics(&mech, motion, load);
             margins(&mech, &motion.pose, Some(&forces), &mut alone);
             let mut broken = 0;
             for (k, (limit, margin)) in mech.limits.iter().zip(&alone).enumerate() {

@@ -4,11 +4,12 @@
 mod common;
 
 use common::{mechanisms, moving, parts, states};
-use polypod_core::dynamics;
-use polypod_core::leg;
-use polypod_core::mechanism::{Body, Mechanism};
-use polypod_core::reactions::{self, Given, Place};
-use polypod_core::real::{Dual, F, Jet, Real, Scalar};
+use polypod_core::dynamics::inverse_dynamics;
+use polypod_core::dynamics::joint_reactions::{self, Given, Place};
+use polypod_core::dynamics::self_stress;
+use polypod_core::kinematics::leg;
+use polypod_core::model::mechanism::{Body, Mechanism};
+use polypod_core::number::real::{Dual, F, Jet, Real, Scalar};
 use polypod_core::spatial::{Acceleration, Mat3, Motion, Pose, Twist, Vec3, Wrench};
 
 /// Of the largest reaction: what a balance may leave.
@@ -19,7 +20,7 @@ fn samples(mech: &Mechanism) -> Vec<Motion<f64>> {
 }
 
 fn load(mech: &Mechanism, state: &Motion<f64>) -> Wrench<f64> {
-    dynamics::load_in_base(mech.load.wrench, mech.load.axes, &state.pose)
+    inverse_dynamics::load_in_base(mech.load.wrench, mech.load.axes, &state.pose)
 }
 
 /// Weight less the rates of linear momentum, and of angular momentum about the mass centre, of a link that moves as its axes
@@ -91,11 +92,11 @@ fn without_spin(axes: Mat3<Jet<f64>>, [delta, d, dd]: [Vec3<f64>; 3]) -> Mat3<Je
 #[test]
 fn every_link_is_balanced_and_free_turns_carry_nothing() {
     for mech in mechanisms() {
-        let joints = reactions::joints(&mech);
+        let joints = joint_reactions::joints(&mech);
         let length = mech.characteristic_length;
         for state in samples(&mech) {
             let found =
-                reactions::solve(&mech, &joints, &state, load(&mech, &state), length).expect("regular");
+                self_stress::solve(&mech, &joints, &state, load(&mech, &state), length).expect("regular");
             for all in [&found.assumed, &found.least] {
                 let largest =
                     all.iter().fold(0.0_f64, |m, w| m.max(w.force.norm()).max(w.torque.norm() / length));
@@ -131,11 +132,11 @@ fn every_link_is_balanced_and_free_turns_carry_nothing() {
 #[test]
 fn prismatic_joints_carry_the_active_forces() {
     for mech in mechanisms() {
-        let joints = reactions::joints(&mech);
+        let joints = joint_reactions::joints(&mech);
         for state in samples(&mech) {
             let load = load(&mech, &state);
-            let found = reactions::solve(&mech, &joints, &state, load, 1.0).expect("regular");
-            let (active, _) = dynamics::inverse_dynamics(&mech, &state, load);
+            let found = self_stress::solve(&mech, &joints, &state, load, 1.0).expect("regular");
+            let (active, _) = inverse_dynamics::inverse_dynamics(&mech, &state, load);
             let largest = active.iter().fold(0.0_f64, |m, f| m.max(f.abs()));
             let mut active = active.iter();
             for (i, leg) in mech.legs.iter().enumerate() {
@@ -154,9 +155,9 @@ fn prismatic_joints_carry_the_active_forces() {
 fn components_are_open_where_constraints_are_redundant() {
     let mut redundant = 0;
     for mech in mechanisms() {
-        let joints = reactions::joints(&mech);
+        let joints = joint_reactions::joints(&mech);
         let state = samples(&mech)[0];
-        let found = reactions::solve(&mech, &joints, &state, load(&mech, &state), 1.0).expect("regular");
+        let found = self_stress::solve(&mech, &joints, &state, load(&mech, &state), 1.0).expect("regular");
         for (joint, marks) in joints.iter().zip(&found.determinate_in_joint) {
             let number = joint.name.rsplit(' ').next().unwrap_or_default();
             let coupled = mech.mobility.redundant_legs.iter().any(|&i| mech.legs[i].name == number);
@@ -173,11 +174,11 @@ fn components_are_open_where_constraints_are_redundant() {
 fn choices_are_least_and_differ_in_open_components_only() {
     let mut different = 0;
     for mech in mechanisms().into_iter().filter(|m| m.mobility.redundant > 0) {
-        let joints = reactions::joints(&mech);
+        let joints = joint_reactions::joints(&mech);
         let length = mech.characteristic_length;
         for state in samples(&mech) {
             let found =
-                reactions::solve(&mech, &joints, &state, load(&mech, &state), length).expect("regular");
+                self_stress::solve(&mech, &joints, &state, load(&mech, &state), length).expect("regular");
             let (mut couples, mut sizes, mut square) = ([0.0; 2], [0.0; 2], 0.0);
             for (j, (joint, place)) in joints.iter().zip(&found.places).enumerate() {
                 let [assumed, least] = [found.assumed[j], found.least[j]];
@@ -219,7 +220,7 @@ fn choices_are_least_and_differ_in_open_components_only() {
 #[test]
 fn joint_axes_are_right_handed() {
     for mech in mechanisms() {
-        let places = reactions::places(&mech, &samples(&mech)[0].pose);
+        let places = joint_reactions::places(&mech, &samples(&mech)[0].pose);
         for axes in places.iter().map(|place| place.axes) {
             let square = axes.departures().iter().all(|e| e.abs() < 1e-12);
             assert!(square && axes.determinant() > 0.0, "{}", mech.name);
@@ -231,11 +232,11 @@ fn joint_axes_are_right_handed() {
 #[test]
 fn the_constraint_wrench_is_what_others_leave() {
     for mech in mechanisms() {
-        let joints = reactions::joints(&mech);
+        let joints = joint_reactions::joints(&mech);
         for state in samples(&mech) {
             let load = load(&mech, &state);
-            let found = reactions::solve(&mech, &joints, &state, load, 1.0).expect("regular");
-            let (active, _) = dynamics::inverse_dynamics(&mech, &state, load);
+            let found = self_stress::solve(&mech, &joints, &state, load, 1.0).expect("regular");
+            let (active, _) = inverse_dynamics::inverse_dynamics(&mech, &state, load);
             let own = Given::of(&mech, &state, load).platform;
             let mut rest = found.constraint + own;
             let mut active = active.iter();
@@ -268,11 +269,11 @@ fn kernels<T: Scalar>(mech: &Mechanism, state: &Motion<f64>, on_platform: &[Wren
     };
     let load = load(mech, state);
     let given = Given::of(mech, &platform, Wrench::new(lift(load.force), lift(load.torque)));
-    let places: Vec<Place<T>> = reactions::places(mech, &platform.pose);
+    let places: Vec<Place<T>> = joint_reactions::places(mech, &platform.pose);
     let tops: Vec<_> = on_platform.iter().map(|w| Wrench::new(lift(w.force), lift(w.torque))).collect();
-    let all = reactions::reactions(mech, &places, &given, &tops);
-    let joints = reactions::joints(mech);
-    let left = reactions::unbalanced(mech, &joints, &places, platform.pose.o, &given, &all);
+    let all = joint_reactions::reactions(mech, &places, &given, &tops);
+    let joints = joint_reactions::joints(mech);
+    let left = joint_reactions::unbalanced(mech, &joints, &places, platform.pose.o, &given, &all);
     let components = all.iter().flat_map(|w| w.array());
     components.chain(left).map(Real::value).collect()
 }
@@ -280,9 +281,10 @@ fn kernels<T: Scalar>(mech: &Mechanism, state: &Motion<f64>, on_platform: &[Wren
 #[test]
 fn the_same_source_serves_every_number() {
     for mech in mechanisms() {
-        let joints = reactions::joints(&mech);
+        let joints = joint_reactions::joints(&mech);
         for state in samples(&mech) {
-            let found = reactions::solve(&mech, &joints, &state, load(&mech, &state), 1.0).expect("regular");
+            let found =
+                self_stress::solve(&mech, &joints, &state, load(&mech, &state), 1.0).expect("regular");
             let tops: Vec<_> =
                 (0..mech.legs.len()).map(|i| found.assumed[mech.rods.len() + 3 * i + 2]).collect();
             let plain = kernels::<f64>(&mech, &state, &tops);

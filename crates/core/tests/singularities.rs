@@ -4,11 +4,11 @@ mod common;
 
 use common::{mechanisms, published, states, with_leg};
 use nalgebra::Matrix6;
-use polypod_core::constraint;
-use polypod_core::jacobian;
-use polypod_core::leg;
-use polypod_core::mechanism::{ConstraintKind, Mechanism};
-use polypod_core::singularity::{self, Kind, TOLERANCE, determinant, singularity};
+use polypod_core::kinematics::constraint;
+use polypod_core::kinematics::jacobian;
+use polypod_core::kinematics::leg;
+use polypod_core::mobility::singularity::{self, Kind, TOLERANCE, determinant, singularity};
+use polypod_core::model::mechanism::{ConstraintKind, Mechanism};
 use polypod_core::spatial::{Mat3, Motion, Pose, Twist};
 
 /// The pose after a time on the motion with the constant twist.

@@ -3,16 +3,16 @@
 mod common;
 
 use common::{published, with_leg, with_leg_backwards};
-use polypod_core::constraint::largest_distance;
-use polypod_core::coordinates::Set;
-use polypod_core::lattice::Lattice;
-use polypod_core::leg;
-use polypod_core::limits::{Bound, Limit, Measure};
-use polypod_core::mechanism::Mechanism;
-use polypod_core::reach::fit;
-use polypod_core::singularity::conditioning;
+use polypod_core::kinematics::constraint::largest_distance;
+use polypod_core::kinematics::coordinate_sets::Set;
+use polypod_core::kinematics::leg;
+use polypod_core::mobility::singularity::conditioning;
+use polypod_core::model::limit::{Bound, Limit, Measure};
+use polypod_core::model::mechanism::Mechanism;
 use polypod_core::spatial::{Pose, Vec3};
-use polypod_core::workspace::{Edge, Flood, Grid, Stop};
+use polypod_core::workspace::fit_orientation::fit;
+use polypod_core::workspace::flood_fill::{Edge, Flood, Grid, Stop};
+use polypod_core::workspace::length_lattice::Lattice;
 
 /// Bounds of o as the grid below has them.
 const ABOVE: [[f64; 2]; 3] = [[-0.8, 0.8], [-0.8, 0.8], [0.1, 1.0]];

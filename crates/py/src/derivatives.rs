@@ -1,12 +1,23 @@
 //! Derivatives of inverse dynamics, regressor and base parameters.
 
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
+use polypod_core::assembly::geometric_parameters;
 use polypod_core::batch;
-use polypod_core::{geometry, inertial};
+use polypod_core::dynamics::regressor::{parameters, standard_values};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use crate::{Array, PyMechanism, arrays, batch_of, loads, states};
+use crate::Array;
+
+use crate::PyMechanism;
+
+use crate::arrays;
+
+use crate::batch_of;
+
+use crate::loads;
+
+use crate::states;
 
 /// Names of the coordinates that are varied, and the arrays.
 #[pyfunction]
@@ -50,7 +61,7 @@ pub fn regressor<'py>(
 /// Names of the numbers of the geometry.
 #[pyfunction]
 pub fn geometry_parameters(mech: &PyMechanism) -> Vec<String> {
-    geometry::parameters(mech.core()).iter().map(|p| p.name(mech.core())).collect()
+    geometric_parameters::parameters(mech.core()).iter().map(|p| p.name(mech.core())).collect()
 }
 
 /// Names of the standard parameters, names of the file's numbers, values of the standard parameters.
@@ -59,11 +70,11 @@ pub fn inertial_parameters<'py>(
     py: Python<'py>,
     mech: &PyMechanism,
 ) -> (Vec<String>, Vec<String>, Bound<'py, PyArray1<f64>>) {
-    let (core, parameters) = (mech.core(), inertial::parameters(mech.core()));
+    let (core, parameters) = (mech.core(), parameters(mech.core()));
     (
         parameters.iter().map(|p| p.standard_name(core)).collect(),
         parameters.iter().map(|p| p.central_name(core)).collect(),
-        PyArray1::from_vec(py, inertial::standard_values(core)),
+        PyArray1::from_vec(py, standard_values(core)),
     )
 }
 
@@ -72,7 +83,8 @@ type BaseParameters<'py> = (Vec<usize>, Bound<'py, PyArray2<f64>>, Bound<'py, Py
 /// Numbers of the parameters that are kept, their combinations one a row, and the remainders of all columns.
 #[pyfunction]
 pub fn base_parameters<'py>(py: Python<'py>, mech: &PyMechanism) -> PyResult<Option<BaseParameters<'py>>> {
-    let Some(found) = py.detach(|| polypod_core::base_parameters::base_parameters(mech.core())) else {
+    let Some(found) = py.detach(|| polypod_core::dynamics::base_parameters::base_parameters(mech.core()))
+    else {
         return Ok(None);
     };
     let shape = [found.combination.nrows(), found.combination.ncols()];

@@ -12,22 +12,22 @@ use std::sync::OnceLock;
 
 use arrays::{Array, PyAxes, arrays, arrays_but, batch_of, slice};
 use numpy::{PyArray1, PyArrayMethods};
-use polypod_core::assembly::assemble;
+use polypod_core::assembly::build::assemble;
 use polypod_core::batch::{self, Coordinates, Loads, Space, States, Table};
-use polypod_core::coordinates::Set;
-use polypod_core::lanes;
-use polypod_core::limits::Limit;
-use polypod_core::mechanism::Mechanism;
-use polypod_core::modes::{self, Start};
-use polypod_core::nearest::Search;
-use polypod_core::reactions;
-use polypod_core::roots::{self, Node, Precision};
-use polypod_core::screws;
-use polypod_core::singularity::{Kind, Screw};
+use polypod_core::dynamics::joint_reactions;
+use polypod_core::forward_kinematics::assembly_modes::{self, Start};
+use polypod_core::kinematics::coordinate_sets::Set;
+use polypod_core::mobility::screw_systems;
+use polypod_core::mobility::singularity::{Kind, Screw};
+use polypod_core::mobility::singularity_distance::Search;
+use polypod_core::model::limit::Limit;
+use polypod_core::model::mechanism::Mechanism;
+use polypod_core::model::spec::{Axes, Fault, Spec};
+use polypod_core::model::status::Status;
+use polypod_core::number::lanes;
+use polypod_core::numerics::hermite_roots::{self, Node, Precision};
+use polypod_core::parallel::threads;
 use polypod_core::spatial::Pose;
-use polypod_core::spec::{Axes, Fault, Spec};
-use polypod_core::status::Status;
-use polypod_core::threads;
 use pyo3::exceptions::{PyKeyError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -158,7 +158,7 @@ impl PyMechanism {
     /// Letters of each leg's joints from base to platform.
     #[getter]
     fn leg_letters(&self) -> Vec<String> {
-        self.0.legs.iter().map(polypod_core::mechanism::Leg::letters).collect()
+        self.0.legs.iter().map(polypod_core::model::mechanism::Leg::letters).collect()
     }
 
     /// Name, all numbers, and whether each must be given (none for a set where any will do).
@@ -288,14 +288,14 @@ impl PyMechanism {
     /// direction.
     fn freedom_screws(&self, poses: Array<'_>) -> PyResult<Option<Vec<ScrewRow>>> {
         let pose = one_pose(&poses)?;
-        let found = screws::freedoms(&self.0, &pose);
+        let found = screw_systems::freedoms(&self.0, &pose);
         Ok(found.map(|all| all.iter().map(|(twist, screw)| screw_row(twist.array(), screw)).collect()))
     }
 
     /// The same of the wrench of every constraint.
     fn constraint_screws(&self, poses: Array<'_>) -> PyResult<Vec<ScrewRow>> {
         let pose = one_pose(&poses)?;
-        let found = screws::constraints(&self.0, &pose);
+        let found = screw_systems::constraints(&self.0, &pose);
         Ok(found.iter().map(|(wrench, screw)| screw_row(wrench.array(), screw)).collect())
     }
 
@@ -452,7 +452,7 @@ impl PyMechanism {
 
     /// Name, kind and links (towards the base, away from it) of each joint.
     fn joint_list(&self) -> Vec<JointRow> {
-        reactions::joints(&self.0).into_iter().map(|j| (j.name, j.kind, j.links)).collect()
+        joint_reactions::joints(&self.0).into_iter().map(|j| (j.name, j.kind, j.links)).collect()
     }
 
     /// Name, kind, legs (from 0), unit, least and greatest value (infinite where there is none) and scale of each limit.
@@ -516,7 +516,7 @@ impl PyMechanism {
     fn assembly_modes<'py>(&self, py: Python<'py>, lengths: Array<'py>) -> PyResult<Option<AllModes<'py>>> {
         let lengths = self.lengths(&lengths)?;
         let found = py.detach(|| {
-            let start = self.1.get_or_init(|| modes::start(&self.0)).as_ref();
+            let start = self.1.get_or_init(|| assembly_modes::start(&self.0)).as_ref();
             start.map(|start| batch::assembly_modes(&self.0, start, lengths))
         });
         let Some(batch::AllModes { modes, counts, status }) = found else { return Ok(None) };
@@ -527,7 +527,7 @@ impl PyMechanism {
 
     /// The number of complex solutions for generic lengths; none where legs and constraints are not six equations.
     fn complex_modes(&self, py: Python<'_>) -> Option<usize> {
-        py.detach(|| self.1.get_or_init(|| modes::start(&self.0)).as_ref().map(Start::solutions))
+        py.detach(|| self.1.get_or_init(|| assembly_modes::start(&self.0)).as_ref().map(Start::solutions))
     }
 
     /// The two legs and their arrays, or none for a mechanism without a coupled pair.
@@ -568,7 +568,10 @@ fn zeros<'py>(
     resolution: f64,
 ) -> PyResult<Vec<(f64, bool)>> {
     let nodes = nodes(&time, &values, &rates)?;
-    Ok(roots::events(&nodes, resolution).into_iter().map(|(t, e)| (t, e == roots::Event::Crossing)).collect())
+    Ok(hermite_roots::events(&nodes, resolution)
+        .into_iter()
+        .map(|(t, e)| (t, e == hermite_roots::Event::Crossing))
+        .collect())
 }
 
 /// Times at which such a function must be known next, none once its zeros are found to the precision of crossings,
@@ -581,7 +584,7 @@ fn unsettled_zeros<'py>(
     precision: [f64; 3],
 ) -> PyResult<Vec<f64>> {
     let [crossing, dip, resolution] = precision;
-    Ok(roots::unsettled(&nodes(&time, &values, &rates)?, &Precision { crossing, dip, resolution }))
+    Ok(hermite_roots::unsettled(&nodes(&time, &values, &rates)?, &Precision { crossing, dip, resolution }))
 }
 
 fn nodes(time: &Array<'_>, values: &Array<'_>, rates: &Array<'_>) -> PyResult<Vec<Node>> {

@@ -2,15 +2,19 @@
 
 use numpy::{PyArray1, PyArrayMethods};
 use polypod_core::batch::{SINGULAR_PIVOTS, pose_of};
-use polypod_core::chart::{Chart, Place};
-use polypod_core::dynamics::load_in_base;
-use polypod_core::forward_dynamics::forward_dynamics;
+use polypod_core::dynamics::forward_dynamics::forward_dynamics;
+use polypod_core::dynamics::inverse_dynamics::load_in_base;
+use polypod_core::kinematics::chart::{Chart, Place};
+use polypod_core::model::spec::Axes;
 use polypod_core::spatial::{Twist, Wrench};
-use polypod_core::spec::Axes;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use crate::{Array, PyMechanism, slice};
+use crate::Array;
+
+use crate::PyMechanism;
+
+use crate::slice;
 
 #[pyclass(name = "Chart", frozen)]
 pub struct PyChart {

@@ -2,16 +2,20 @@
 
 use numpy::{PyArray1, PyArray3, PyArrayMethods};
 use polypod_core::batch::pose_of;
-use polypod_core::lattice::Lattice;
-use polypod_core::reach::fit;
+use polypod_core::parallel::threads::Team;
 use polypod_core::spatial::{Pose, Vec3};
-use polypod_core::threads::Team;
-use polypod_core::workspace::{Flood, Grid, Stop};
+use polypod_core::workspace::fit_orientation::fit;
+use polypod_core::workspace::flood_fill::{Flood, Grid, Stop};
+use polypod_core::workspace::length_lattice::Lattice;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use crate::{Array, PyMechanism, slice};
+use crate::Array;
+
+use crate::PyMechanism;
+
+use crate::slice;
 
 /// Codes of what stops the platform where it is no limit.
 const SINGULARITY: i64 = -1;

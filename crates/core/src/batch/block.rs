@@ -9,10 +9,10 @@ use std::ops::Range;
 use rayon::prelude::*;
 
 use super::{Field, FieldId, Table};
-use crate::lanes::{self, Lanes, Line, Task, WIDTH};
-use crate::status::Status;
-use crate::streaming;
-use crate::threads;
+use crate::model::status::Status;
+use crate::number::lanes::{self, Lanes, Line, Task, WIDTH};
+use crate::parallel::streaming_stores;
+use crate::parallel::threads;
 
 /// So many states at least are worth a thread of their own.
 const GRAIN: usize = 2048;
@@ -424,7 +424,7 @@ impl<O: Working<N>, const N: usize> Task for Blocks<'_, O, N> {
                 copy::<V>(&rows[start..start + width], &answered[..held], &mut staged, places);
             }
         }
-        streaming::finish();
+        streaming_stores::finish();
     }
 }
 
@@ -439,11 +439,11 @@ fn copy<V: Lanes>(
 ) {
     if *answered == [true; WIDTH] {
         let numbers = rows.len() * WIDTH;
-        if staged.is_empty() || !streaming::begins_line(to) {
+        if staged.is_empty() || !streaming_stores::begins_line(to) {
             return V::scatter(rows, to);
         }
         V::scatter(rows, staged);
-        return streaming::copy(&staged[..numbers], &mut to[..numbers]);
+        return streaming_stores::copy(&staged[..numbers], &mut to[..numbers]);
     }
     for (lane, (answered, places)) in answered.iter().zip(to.chunks_exact_mut(rows.len().max(1))).enumerate()
     {

@@ -1,15 +1,16 @@
 //! Whether a state is one that the mechanism can be in: the checks that every operation makes of its input.
 
 use super::block::{self, At, Codes};
-use crate::constraint;
-use crate::forward_dynamics::square;
-use crate::lanes::{self, Lanes, Row, Task, WIDTH};
-use crate::leg::{self, Position};
-use crate::limits::{Limit, Seen};
-use crate::mechanism::{Constraint, Drive, Leg, Mechanism, Turning};
-use crate::real::{Ordered, Real};
+use crate::dynamics::forward_dynamics::square;
+use crate::kinematics::constraint;
+use crate::kinematics::leg::{self, Position};
+use crate::limits::margins::Seen;
+use crate::model::limit::Limit;
+use crate::model::mechanism::{Constraint, Drive, Leg, Mechanism, Turning};
+use crate::model::status::Status;
+use crate::number::lanes::{self, Lanes, Row, Task, WIDTH};
+use crate::number::real::{Ordered, Real};
 use crate::spatial::{Mat3, Motion, Pose, Twist, Vec3};
-use crate::status::Status;
 
 /// Largest entry of `RᵀR - 1` for a rotation.
 const ROTATION_TOLERANCE: f64 = 1e-6;

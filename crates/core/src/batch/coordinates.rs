@@ -5,11 +5,11 @@ use super::block::{self, Answers, At, Codes, Operation, Pieces};
 use super::checks::{
     check_legs, finite, forwards, is_rotation, pose_at, raw_pose, then, with_legs, with_motion,
 };
-use crate::coordinates::{self, Dependent, MAX_COORDINATES, Set, State, Values};
-use crate::lanes::Lanes;
-use crate::mechanism::Mechanism;
-use crate::real::{Jet, Real};
-use crate::status::Status;
+use crate::kinematics::coordinate_sets::{self, Dependent, MAX_COORDINATES, Set, State, Values};
+use crate::model::mechanism::Mechanism;
+use crate::model::status::Status;
+use crate::number::lanes::Lanes;
+use crate::number::real::{Jet, Real};
 
 /// Given coordinates of the states with their rates and second rates: `given[k]` holds the three series of the
 /// `k`-th number of the set, or nothing where it is to be solved.
@@ -65,7 +65,7 @@ pub fn states(mech: &Mechanism, input: &Coordinates, n: usize) -> Table {
                 None if !input.continued => mech.home,
                 _ => last,
             };
-            let state = coordinates::state(mech, &input.set, &q, &mask, input.branch, &guess);
+            let state = coordinate_sets::state(mech, &input.set, &q, &mask, input.branch, &guess);
             let state = checked(mech, state, all_given);
             let jumped = input.continued && state.status == Status::Ok && state.branch * branch < 0.0;
             let status = if jumped { Status::BranchJump } else { state.status };
@@ -118,15 +118,21 @@ impl Operation<6> for FromCoordinates<'_> {
                 codes = codes.unless(finite(&[q[k].x, q[k].d, q[k].dd]), Status::InvalidInput);
             }
         }
-        let [pose, regular] = coordinates::complete(mech, &input.set, &mut q, input.branch);
+        let [pose, regular] = coordinate_sets::complete(mech, &input.set, &mut q, input.branch);
         codes = codes.unless(pose.0, pose.1).unless(regular.0, regular.1);
         if self.dependent.count > 0 && !matches!(input.set, Set::Paper(_)) {
             let wanted = codes.are(Status::Ok);
-            let ([found, regular], _) =
-                coordinates::solve_dependent(mech, &input.set, &mut q, &self.dependent, &self.start, wanted);
+            let ([found, regular], _) = coordinate_sets::solve_dependent(
+                mech,
+                &input.set,
+                &mut q,
+                &self.dependent,
+                &self.start,
+                wanted,
+            );
             codes = codes.unless(found.0, found.1).unless(regular.0, regular.1);
         }
-        let platform = coordinates::motion(&input.set.pose(mech, &q));
+        let platform = coordinate_sets::motion(&input.set.pose(mech, &q));
         codes = with_legs(mech, &platform.pose, codes);
         codes = if self.all_given {
             with_motion(mech, &platform, codes)

@@ -3,15 +3,15 @@
 use super::block::{self, Answers, At, Codes, Working};
 use super::checks::{solved, within_limits};
 use super::{FieldId, Loads, States, Table, redundant};
-use crate::coordinates::{DEPENDENT_PIVOTS, MAX_COORDINATES, Set};
-use crate::derivatives::{self, Column, Coordinates, DIRECTIONS, Solved, Varied};
-use crate::dynamics::{Answering, resultant};
-use crate::geometry;
-use crate::inertial::{self, Regressor};
-use crate::lanes::Lanes;
-use crate::leg;
-use crate::mechanism::Mechanism;
-use crate::status::Status;
+use crate::assembly::geometric_parameters;
+use crate::dynamics::derivatives::{self, Column, Coordinates, DIRECTIONS, Solved, Varied};
+use crate::dynamics::inverse_dynamics::{Answering, resultant};
+use crate::dynamics::regressor::{self, Regressor};
+use crate::kinematics::coordinate_sets::{DEPENDENT_PIVOTS, MAX_COORDINATES, Set};
+use crate::kinematics::leg;
+use crate::model::mechanism::Mechanism;
+use crate::model::status::Status;
+use crate::number::lanes::Lanes;
 
 /// A field for the forces of all legs and one for the multipliers.
 type Pair = [FieldId; 2];
@@ -31,8 +31,8 @@ pub fn inverse_dynamics_derivatives(
         std::array::from_fn(|k| k >= set.names().len() || given.get(k).copied().unwrap_or(false));
     let chosen = (0..set.names().len()).filter(|&k| given[k]).count();
     let (forces, multipliers) = (mech.legs.len(), mech.independent.len());
-    let bodies = inertial::parameters(mech).len();
-    let geometry = geometry::parameters(mech);
+    let bodies = regressor::parameters(mech).len();
+    let geometry = geometric_parameters::parameters(mech);
     let fields = [
         ("forces_by_pose", vec![forces, 6]),
         ("constraint_by_pose", vec![multipliers, 6]),
@@ -199,7 +199,7 @@ fn pair(ids: &[FieldId; 17], k: usize) -> Pair {
 /// \[T57\].
 #[must_use]
 pub fn regressors(mech: &Mechanism, states: &States, loads: &Loads) -> Table {
-    let width = inertial::parameters(mech).len();
+    let width = regressor::parameters(mech).len();
     let (forces, multipliers) = (mech.legs.len(), mech.independent.len());
     let fields = [
         ("forces", vec![forces, width]),

@@ -3,17 +3,17 @@
 use super::block::{self, Answers, At, Codes, Operation};
 use super::checks::{finite, pose_at, solved, with_leg, with_motion, within_limits, within_limits_of};
 use super::{FieldId, States, Table, redundant};
-use crate::dynamics::{self, Balance};
-use crate::idle;
-use crate::lanes::Lanes;
-use crate::leg;
-use crate::limits::Seen;
-use crate::mechanism::Mechanism;
-use crate::mobility;
-use crate::real::Dual;
+use crate::dynamics::inverse_dynamics::{self, Balance};
+use crate::kinematics::idle;
+use crate::kinematics::leg;
+use crate::limits::margins::Seen;
+use crate::mobility::degrees_of_freedom;
+use crate::model::mechanism::Mechanism;
+use crate::model::spec::Axes;
+use crate::model::status::Status;
+use crate::number::lanes::Lanes;
+use crate::number::real::Dual;
 use crate::spatial::{Motion, Pose, Twist, Vec3, Wrench};
-use crate::spec::Axes;
-use crate::status::Status;
 
 /// The loads of the states: the mechanism's own, or six numbers for each.
 #[derive(Clone, Copy, Debug)]
@@ -26,7 +26,7 @@ impl Loads<'_> {
     #[inline(always)]
     pub(super) fn of<V: Lanes>(&self, mech: &Mechanism, pose: &Pose<V>, at: At) -> Wrench<V> {
         let (wrench, axes) = self.given(mech, at);
-        dynamics::load_in_base(wrench, axes, pose)
+        inverse_dynamics::load_in_base(wrench, axes, pose)
     }
 
     /// As they are given, with their axes.
@@ -122,7 +122,7 @@ pub fn coupled_forces(
     multipliers: &[f64],
     as_printed: bool,
 ) -> Option<([usize; 2], Table)> {
-    let (pair, axis, platform_axis) = mobility::coupled_pair(mech)?;
+    let (pair, axis, platform_axis) = degrees_of_freedom::coupled_pair(mech)?;
     let index = mech.independent.iter().position(|c| pair.contains(&c.leg))?;
     let operation = CoupledForces { mech, pair, axis, platform_axis, index, poses, multipliers, as_printed };
     let fields = [("forces", vec![2]), ("torque", vec![])];
@@ -148,7 +148,15 @@ impl Operation<2> for CoupledForces<'_> {
         let (pose, codes) = pose_at(mech, self.poses, at);
         let f_c: V = at.read_one(self.multipliers, mech.independent.len(), self.index);
         let (axis, platform_axis) = (self.axis, self.platform_axis);
-        let c = dynamics::coupled_forces(mech, self.pair, axis, platform_axis, &pose, f_c, self.as_printed);
+        let c = inverse_dynamics::coupled_forces(
+            mech,
+            self.pair,
+            axis,
+            platform_axis,
+            &pose,
+            f_c,
+            self.as_printed,
+        );
         answers.put(forces, 0, c.forces);
         answers.put(torque, 0, [c.torque]);
         codes.unless(finite(&[f_c]), Status::InvalidInput).unless(finite(&c.forces), Status::Singular)
@@ -189,8 +197,8 @@ impl Operation<9> for Power<'_> {
         let Motion { pose, twist, .. } = &platform;
         let (kinetic, potential) = energy_along(mech, &platform);
         let load = wrench.power(twist);
-        let damping = dynamics::damping_wrench(mech, twist).power(twist);
-        let (f, pivots) = dynamics::inverse_dynamics(mech, &platform, wrench);
+        let damping = inverse_dynamics::damping_wrench(mech, twist).power(twist);
+        let (f, pivots) = inverse_dynamics::inverse_dynamics(mech, &platform, wrench);
         let regular = solved(mech, &f, pivots, Codes::ok()).are(Status::Ok);
         let (mut actuators, mut row) = (V::zero(), 0);
         for leg in &mech.legs {
@@ -205,7 +213,7 @@ impl Operation<9> for Power<'_> {
         }
         actuators = V::select(regular, actuators, V::lit(f64::NAN));
         // What the efficiency takes: actuators serve the platform's term of [Eq. 42] 1/η times.
-        let own = (wrench + dynamics::platform_wrench(mech, &platform)).power(twist);
+        let own = (wrench + inverse_dynamics::platform_wrench(mech, &platform)).power(twist);
         let friction = own.scale(1.0 / mech.efficiency - 1.0);
         let residual = actuators + load + damping + friction - kinetic.d - potential.d;
         let values =
@@ -224,5 +232,5 @@ fn energy_along<V: Lanes>(mech: &Mechanism, platform: &Motion<V>) -> (Dual<V>, D
     let Motion { pose, twist, acceleration } = platform;
     let moving = pose.along(twist);
     let twist = Twist::new(twist.v.with_rate(acceleration.a), twist.omega.with_rate(acceleration.eps));
-    dynamics::energy(mech, &moving, &twist)
+    inverse_dynamics::energy(mech, &moving, &twist)
 }

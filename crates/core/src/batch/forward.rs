@@ -3,16 +3,17 @@
 use super::Table;
 use super::block::{self, Codes, Pieces, Rows};
 use super::checks::{actuated_values, forwards, is_rotation, joint_limits, raw_pose, then, with_legs};
-use crate::forward::{self, Asked, Found, asked_of_all};
-use crate::forward_lanes::{Poses, forward_kinematics_of, load, load_asked, put, put_numbers};
-use crate::lanes::{self, Lanes, Row, Task, WIDTH};
-use crate::least;
-use crate::leg;
-use crate::limits::Seen;
-use crate::mechanism::{Drive, Mechanism};
-use crate::modes::{self, Start};
+use crate::forward_kinematics::assembly_modes::{self, Start};
+use crate::forward_kinematics::gauss_newton;
+use crate::forward_kinematics::newton::{self, Asked, Found, asked_of_all};
+use crate::forward_kinematics::newton_lanes::{forward_kinematics_of, load_asked, put_numbers};
+use crate::kinematics::leg;
+use crate::limits::margins::Seen;
+use crate::model::mechanism::{Drive, Mechanism};
+use crate::model::status::Status;
+use crate::number::lanes::{self, Lanes, Row, Task, WIDTH};
+use crate::spatial::packed_poses::{Poses, load, put};
 use crate::spatial::{Pose, Vec3};
-use crate::status::Status;
 
 /// The pose for each set of lengths of all legs (those of passive legs are not read), in the assembly mode of its
 /// guess: one for each state or one for all. `continued` starts each state from the last one that was solved, and tells
@@ -34,7 +35,7 @@ pub fn forward_kinematics(
     };
     let fields = [("pose", vec![4, 4]), ("residual", vec![]), ("iterations", vec![])];
     let asked = |i: usize| actuated_values(mech, lengths, i);
-    if !continued && !least::serves(mech) {
+    if !continued && !gauss_newton::serves(mech) {
         return block::in_pieces(n, fields, IN_LANES, |rows, piece| {
             let (mut states, mut numbers) = (Vec::with_capacity(WIDTH), Vec::with_capacity(WIDTH));
             let last = piece.end;
@@ -70,9 +71,9 @@ pub fn forward_kinematics(
             let values = asked(i);
             let mut found = found_near(mech, &values, &guess);
             if let (Some(last), Some(before), Status::Ok, false) =
-                (last, before, found.status, least::serves(mech))
+                (last, before, found.status, gauss_newton::serves(mech))
             {
-                found = forward::passed(mech, &values, &before, &last, &found).unwrap_or(found);
+                found = newton::passed(mech, &values, &before, &last, &found).unwrap_or(found);
             }
             let status = then(found.status, || check_found(mech, &values, &found.pose));
             put_found(rows, i, &found, status);
@@ -94,10 +95,10 @@ pub fn forward_kinematics(
 
 /// The pose with these lengths that belongs to a guess.
 fn found_near(mech: &Mechanism, lengths: &[f64], guess: &Pose<f64>) -> Found {
-    if least::serves(mech) {
-        least::forward_kinematics(mech, lengths, guess)
+    if gauss_newton::serves(mech) {
+        gauss_newton::forward_kinematics(mech, lengths, guess)
     } else {
-        forward::forward_kinematics(mech, lengths, guess)
+        newton::forward_kinematics(mech, lengths, guess)
     }
 }
 
@@ -163,7 +164,7 @@ impl Task for Checks<'_> {
 /// that were asked for, which the pose's own miss by its error: lengths at the very end of a stroke are within it.
 #[inline(always)]
 fn check<V: Lanes>(mech: &Mechanism, asked: &[Asked<V>], pose: &Pose<V>) -> Codes<V> {
-    let missed = forward::error(mech, asked, pose);
+    let missed = newton::error(mech, asked, pose);
     let codes = forwards(mech, pose, with_legs(mech, pose, Codes::ok()));
     within_limits_missed(mech, pose, missed, on_branch(mech, asked, pose, codes))
 }
@@ -229,8 +230,9 @@ fn lengths_of<'a>(mech: &Mechanism, lengths: &'a [f64], i: usize) -> &'a [f64] {
 pub fn assembly_modes(mech: &Mechanism, start: &Start, lengths: &[f64]) -> AllModes {
     let n = lengths.len() / mech.legs.len();
     let asked = |i: usize| actuated_values(mech, lengths, i);
-    let found = block::each(n, |i| modes::assembly_modes_of_all(mech, start, lengths_of(mech, lengths, i)));
-    let all: Vec<(usize, &modes::Mode)> =
+    let found =
+        block::each(n, |i| assembly_modes::assembly_modes_of_all(mech, start, lengths_of(mech, lengths, i)));
+    let all: Vec<(usize, &assembly_modes::Mode)> =
         found.iter().enumerate().flat_map(|(i, f)| f.modes.iter().map(move |mode| (i, mode))).collect();
     let [sign, above, multiplicity, residual] =
         ["determinant_sign", "above", "multiplicity", "residual"].map(|name| (name, vec![]));

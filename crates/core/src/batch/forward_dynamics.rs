@@ -4,14 +4,14 @@ use super::block::{self, Answers, At, Codes, Operation, Pieces, Rows};
 use super::checks::{SINGULAR_PIVOTS, actuated, finite, limit_status, pose_at, with_twist, within_limits};
 use super::dynamics::Loads;
 use super::{FieldId, Table, redundant};
-use crate::coordinates::Set;
-use crate::forward_dynamics::{self, Equations};
-use crate::lanes::Lanes;
-use crate::leg;
-use crate::mechanism::Mechanism;
-use crate::nearest::{self, Search};
+use crate::dynamics::forward_dynamics::{self, Equations};
+use crate::kinematics::coordinate_sets::Set;
+use crate::kinematics::leg;
+use crate::mobility::singularity_distance::{self, Search};
+use crate::model::mechanism::Mechanism;
+use crate::model::status::Status;
+use crate::number::lanes::Lanes;
 use crate::spatial::{Pose, Twist};
-use crate::status::Status;
 
 /// Pose and twist of a state, and whether it is one that the mechanism can be in.
 fn read(mech: &Mechanism, poses: &[f64], twists: &[f64], i: usize) -> (Pose<f64>, Twist<f64>, Status) {
@@ -122,7 +122,7 @@ fn equations(
         Space::Coordinates(set, given) => {
             let search =
                 Search { set: **set, given: given.clone(), reach: 0.0, scale: mech.characteristic_length };
-            let (q, branch) = nearest::start(mech, &search, pose)?;
+            let (q, branch) = singularity_distance::start(mech, &search, pose)?;
             forward_dynamics::coordinate_equations(mech, set, given, (&q, branch), pose, twist)
         }
     }

@@ -5,14 +5,15 @@ use super::checks::{
     actuated, any_pose, finite, kept, pose_at, solved, with_leg, with_motion, with_twist, within_limits_of,
 };
 use super::{States, Table, redundant};
-use crate::jacobian;
-use crate::joints::{self, Zero};
-use crate::lanes::Lanes;
-use crate::leg;
-use crate::limits::Seen;
-use crate::mechanism::Mechanism;
+use crate::kinematics::jacobian;
+use crate::kinematics::leg;
+use crate::kinematics::passive_joints;
+use crate::limits::margins::Seen;
+use crate::model::limit::Zero;
+use crate::model::mechanism::Mechanism;
+use crate::model::status::Status;
+use crate::number::lanes::Lanes;
 use crate::spatial::{Twist, Vec3};
-use crate::status::Status;
 
 /// Lengths, vectors r and directions δ of all legs [Eq. 3].
 #[must_use]
@@ -152,7 +153,7 @@ impl Operation<21> for Kinematics<'_> {
             legs = with_leg(mech, leg, p, frame.sine * frame.sine, legs);
             seen.next(p);
             let (piston, cylinder) = (leg::piston(leg, &state), leg::cylinder(leg, &state));
-            let [below, above] = joints::angles(leg, zero, &platform, &state);
+            let [below, above] = passive_joints::angles(leg, zero, &platform, &state);
             let [
                 lengths,
                 rates,
@@ -196,7 +197,7 @@ impl Operation<21> for Kinematics<'_> {
             answers.put(platform_cone_angle, k, [above.cone]);
             for (r, rod) in mech.rods.iter().enumerate().filter(|(_, rod)| rod.leader == k) {
                 let (axis, turn) = (Vec3::lift(rod.axis), leg::rod_turn(Vec3::lift(rod.axis), &state));
-                answers.put(rod_angle, r, [joints::rod_angle(mech, r, zero, frame.n())]);
+                answers.put(rod_angle, r, [passive_joints::rod_angle(mech, r, zero, frame.n())]);
                 answers.put(rod_omega, r, (axis * turn.rate).array());
                 answers.put(rod_eps, r, (axis * turn.acceleration).array());
             }

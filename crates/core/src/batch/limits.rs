@@ -4,11 +4,12 @@ use super::block::{self, Answers, At, Codes, Operation};
 use super::checks::solved;
 use super::dynamics::Loads;
 use super::{States, Table, redundant};
-use crate::dynamics;
-use crate::lanes::Lanes;
-use crate::limits::{Binding, Measure, Seen};
-use crate::mechanism::Mechanism;
-use crate::status::Status;
+use crate::dynamics::inverse_dynamics;
+use crate::limits::margins::{Binding, Seen};
+use crate::model::limit::Measure;
+use crate::model::mechanism::Mechanism;
+use crate::model::status::Status;
+use crate::number::lanes::Lanes;
 
 /// Signed slack of every limit, the same relative to the limit's scale, the number of the limit that binds, and 1 where
 /// all are kept \[T35\]. Forces are those of the motion; where they are not determined their margins are NaN and no limit
@@ -40,7 +41,7 @@ impl Operation<4> for Limits<'_> {
         let (platform, load, mut codes) = self.states.loaded_at(mech, self.loads, at);
         let mut forces = [V::lit(f64::NAN); 6];
         if self.forces {
-            let (f, pivots) = dynamics::inverse_dynamics(mech, &platform, load);
+            let (f, pivots) = inverse_dynamics::inverse_dynamics(mech, &platform, load);
             let determined = solved(mech, &f, pivots, Codes::<V>::ok()).are(Status::Ok);
             for k in 0..6 {
                 forces[k] = V::select(determined, f[k], forces[k]);

@@ -27,10 +27,10 @@ pub use singularity::{conditioning, determinants, nearest_singular, searched_coo
 pub use limits::limits;
 pub use reactions::joint_reactions;
 
-use crate::lanes::Lanes;
-use crate::mechanism::Mechanism;
+use crate::model::mechanism::Mechanism;
+use crate::model::status::Status;
+use crate::number::lanes::Lanes;
 use crate::spatial::{Acceleration, Motion, Pose, Twist, Wrench};
-use crate::status::Status;
 use block::{At, Codes};
 use checks::{any_pose, finite, with_legs, with_motion};
 

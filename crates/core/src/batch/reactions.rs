@@ -4,18 +4,18 @@ use super::block::{self, Answers, At, Codes, Pieces, Rows, Working};
 use super::checks::{limit_status, then, within_limits};
 use super::dynamics::Loads;
 use super::{FieldId, States, Table};
-use crate::lanes::Lanes;
-use crate::mechanism::Mechanism;
-use crate::reactions::{self, Joint};
-use crate::self_stress::Solver;
-use crate::status::Status;
+use crate::dynamics::joint_reactions::{self, Joint};
+use crate::dynamics::self_stress::Solver;
+use crate::model::mechanism::Mechanism;
+use crate::model::status::Status;
+use crate::number::lanes::Lanes;
 
 /// Reactions of all joints on the links on their platform's side, each at its joint's point \[T44\]-\[T48\], in the order of
-/// [`reactions::joints`]. Which components are determinate is told by 1 and 0. `scale`, m, is what torques are divided by
+/// [`joint_reactions::joints`]. Which components are determinate is told by 1 and 0. `scale`, m, is what torques are divided by
 /// where the least sum of squares is sought.
 #[must_use]
 pub fn joint_reactions(mech: &Mechanism, states: &States, loads: &Loads, scale: f64) -> Table {
-    let joints = reactions::joints(mech);
+    let joints = joint_reactions::joints(mech);
     let width = joints.len();
     let six = || vec![width, 6];
     let fields = [

@@ -3,19 +3,21 @@
 use super::block::{self, At, Pieces, Rows};
 use super::checks::{actuated_values, any_pose, finite, limit_status, pose_at, then, with_twist};
 use super::{FieldId, Loads, States, Table};
-use crate::coordinates::{DEPENDENT_PIVOTS, MAX_COORDINATES, Set};
-use crate::derivatives::{Coordinates, Varied};
-use crate::dynamics::{self, resultant};
-use crate::forward_dynamics;
-use crate::geometry;
-use crate::inertial::Regressor;
-use crate::leg;
-use crate::limits::{Binding, Measure, Seen};
-use crate::mechanism::Mechanism;
-use crate::real::Dual;
-use crate::redundant::{self, Column, Followed, Parted, Solved};
+use crate::assembly::geometric_parameters;
+use crate::dynamics::derivatives::{Coordinates, Varied};
+use crate::dynamics::forward_dynamics;
+use crate::dynamics::inverse_dynamics::{self, resultant};
+use crate::dynamics::redundant_actuation::{self, Column, Followed, Parted, Solved};
+use crate::dynamics::regressor::Regressor;
+use crate::kinematics::coordinate_sets::{DEPENDENT_PIVOTS, MAX_COORDINATES, Set};
+use crate::kinematics::leg;
+use crate::kinematics::rows::{all_hessians, all_rows};
+use crate::limits::margins::{Binding, Seen};
+use crate::model::limit::Measure;
+use crate::model::mechanism::Mechanism;
+use crate::model::status::Status;
+use crate::number::real::Dual;
 use crate::spatial::{Motion, Twist, Wrench};
-use crate::status::Status;
 
 /// J for each pose, constraint satisfied or not [Eq. 13].
 pub(super) fn jacobians(mech: &Mechanism, poses: &[f64]) -> Table {
@@ -24,7 +26,7 @@ pub(super) fn jacobians(mech: &Mechanism, poses: &[f64]) -> Table {
         let (pose, codes) = any_pose::<f64>(poses, At::one(i));
         if codes.status() == Status::Ok {
             let [field] = block::fields();
-            for (k, row) in redundant::jacobian(mech, &pose).iter().enumerate() {
+            for (k, row) in all_rows(mech, &pose).iter().enumerate() {
                 rows.set(field, i, k, row);
             }
         }
@@ -39,7 +41,7 @@ pub(super) fn hessians(mech: &Mechanism, poses: &[f64]) -> Table {
         let (pose, codes) = any_pose::<f64>(poses, At::one(i));
         if codes.status() == Status::Ok {
             let [field] = block::fields();
-            for (k, layer) in redundant::hessian(mech, &pose).iter().enumerate() {
+            for (k, layer) in all_hessians(mech, &pose).iter().enumerate() {
                 rows.set(field, i, k, &layer.concat());
             }
         }
@@ -53,7 +55,7 @@ pub(super) fn platform_twist(mech: &Mechanism, poses: &[f64], rates: &[f64]) -> 
         let (pose, codes) = pose_at::<f64>(mech, poses, At::one(i));
         let legs = actuated_values(mech, rates, i);
         let status = codes.unless(finite(&legs), Status::InvalidInput).status();
-        then(status, || put_followed(rows, i, &redundant::platform_twist(mech, &pose, &legs)))
+        then(status, || put_followed(rows, i, &redundant_actuation::platform_twist(mech, &pose, &legs)))
     })
 }
 
@@ -70,7 +72,7 @@ pub(super) fn platform_acceleration(
         let legs = actuated_values(mech, accelerations, i);
         let codes = with_twist(mech, &pose, &twist, codes).unless(finite(&legs), Status::InvalidInput);
         then(codes.status(), || {
-            put_followed(rows, i, &redundant::platform_acceleration(mech, &pose, &twist, &legs))
+            put_followed(rows, i, &redundant_actuation::platform_acceleration(mech, &pose, &twist, &legs))
         })
     })
 }
@@ -110,7 +112,7 @@ pub(super) fn inverse_dynamics(
         if status != Status::Ok {
             return status;
         }
-        let found = redundant::inverse_dynamics(mech, &platform, load, &near);
+        let found = redundant_actuation::inverse_dynamics(mech, &platform, load, &near);
         if !found.regular {
             return Status::Singular;
         }
@@ -151,14 +153,14 @@ pub(super) fn power<const N: usize>(
         let Motion { pose, twist, .. } = &platform;
         let (kinetic, potential) = energy(&platform);
         let load = wrench.power(twist);
-        let damping = dynamics::damping_wrench(mech, twist).power(twist);
-        let found = redundant::inverse_dynamics(mech, &platform, wrench, &[]);
-        let rates = redundant::jacobian(mech, pose);
+        let damping = inverse_dynamics::damping_wrench(mech, twist).power(twist);
+        let found = redundant_actuation::inverse_dynamics(mech, &platform, wrench, &[]);
+        let rates = all_rows(mech, pose);
         let rates = rates.iter().map(|row| Wrench::from_array(*row).power(twist));
         let driven = found.forces.len() + mech.idle.len();
         let forces = found.forces.iter().chain(&found.multipliers).take(driven);
         let actuators: f64 = rates.zip(forces).map(|(rate, force)| rate * force).sum();
-        let own = (wrench + dynamics::platform_wrench(mech, &platform)).power(twist);
+        let own = (wrench + inverse_dynamics::platform_wrench(mech, &platform)).power(twist);
         let friction = own * (1.0 / mech.efficiency - 1.0);
         let residual = actuators + load + damping + friction - kinetic.d - potential.d;
         let values =
@@ -186,7 +188,7 @@ pub(super) fn limits(
         }
         let mut forces = vec![];
         if asked {
-            let found = redundant::inverse_dynamics(mech, &platform, load, &[]);
+            let found = redundant_actuation::inverse_dynamics(mech, &platform, load, &[]);
             forces = found.forces;
             status = if found.regular { status } else { Status::Singular };
         }
@@ -261,7 +263,7 @@ pub(super) fn inverse_dynamics_derivatives(
 ) -> Table {
     let numbers: Vec<usize> = (0..set.names().len()).filter(|&k| given[k]).collect();
     let (still, regressor) = (Varied::none(mech, set), Regressor::new(mech));
-    let varied = geometry::parameters(mech);
+    let varied = geometric_parameters::parameters(mech);
     let varied: Option<Vec<Varied>> = varied.iter().map(|p| Varied::new(mech, p, set)).collect();
     block::one_by_one(states.len(), fields, Pieces::SLOW, |rows, i| {
         let ids: [FieldId; 17] = block::fields();
@@ -270,7 +272,7 @@ pub(super) fn inverse_dynamics_derivatives(
             Ok(at) => at,
             Err(status) => return status,
         };
-        let by_motion = redundant::by_motion(mech, &still, &at);
+        let by_motion = redundant_actuation::by_motion(mech, &still, &at);
         for order in 0..3 {
             put(mech, rows, i, pair(order), &by_motion[6 * order..6 * order + 6]);
         }
@@ -286,7 +288,7 @@ pub(super) fn inverse_dynamics_derivatives(
         for order in 0..3 {
             let step = |&number: &usize| by.step(&by.varied(&still, number), order);
             let columns: Vec<Column> =
-                numbers.iter().map(|k| redundant::combined(&by_motion, &step(k))).collect();
+                numbers.iter().map(|k| redundant_actuation::combined(&by_motion, &step(k))).collect();
             if known(&columns) {
                 put(mech, rows, i, pair(3 + order), &columns);
             } else {
@@ -296,7 +298,7 @@ pub(super) fn inverse_dynamics_derivatives(
         let mut lengths = vec![vec![0.0; mech.legs.len()]; varied.as_ref().map_or(0, Vec::len)];
         let by_geometry = varied.as_ref().map(|varied| {
             let of = |(v, lengths): (&Varied, &mut Vec<f64>)| {
-                redundant::by_geometry(v, &at, &by_motion, &by, lengths)
+                redundant_actuation::by_geometry(v, &at, &by_motion, &by, lengths)
             };
             varied.iter().zip(&mut lengths).map(of).collect::<Vec<Column>>()
         });

@@ -3,13 +3,13 @@
 use super::block::{self, Answers, At, Codes, Operation, Pieces};
 use super::checks::{any_pose, finite, kept, reached, read_pose};
 use super::{FieldId, Table};
-use crate::coordinates::{self, Set};
-use crate::lanes::Lanes;
-use crate::mechanism::Mechanism;
-use crate::nearest::{self, Search};
-use crate::singularity;
+use crate::kinematics::coordinate_sets::{self, Set};
+use crate::mobility::singularity;
+use crate::mobility::singularity_distance::{self, Search};
+use crate::model::mechanism::Mechanism;
+use crate::model::status::Status;
+use crate::number::lanes::Lanes;
 use crate::spatial::{Pose, Twist};
-use crate::status::Status;
 
 /// A pose that keeps the constraints, whether or not its legs have frames: a singular pose is one too.
 fn read(mech: &Mechanism, poses: &[f64], i: usize) -> (Pose<f64>, Status) {
@@ -125,7 +125,7 @@ pub fn singularities(mech: &Mechanism, poses: &[f64], scale: f64, tolerance: f64
 #[must_use]
 pub fn searched_coordinates(mech: &Mechanism, set: &Set, names: Option<&[String]>) -> Vec<bool> {
     names.map_or_else(
-        || coordinates::best_given(mech, set),
+        || coordinate_sets::best_given(mech, set),
         |names| set.names().iter().map(|name| names.iter().any(|n| n == name)).collect(),
     )
 }
@@ -141,14 +141,16 @@ pub fn nearest_singular(mech: &Mechanism, poses: &[f64], search: &Search) -> Tab
     let [value, singular, kind, searched] = block::fields();
     block::one_by_one(n, fields, Pieces::EACH, |rows, i| {
         let (pose, status) = read_pose(mech, poses, i);
-        let found = if status == Status::Ok { nearest::start(mech, search, &pose) } else { Err(status) };
+        let found =
+            if status == Status::Ok { singularity_distance::start(mech, search, &pose) } else { Err(status) };
         let (q, branch) = match found {
             Ok(start) => start,
             Err(status) => return status,
         };
         for (k, &index) in given.iter().enumerate() {
             rows.set(value, i, k, &[q[index]]);
-            let both = [-1.0, 1.0].map(|d| nearest::along(mech, search, &pose, (&q, branch), index, d));
+            let both =
+                [-1.0, 1.0].map(|d| singularity_distance::along(mech, search, &pose, (&q, branch), index, d));
             rows.set(singular, i, k, &both.map(|b| b.value));
             rows.set(kind, i, k, &both.map(|b| b.kind.map_or(f64::NAN, |kind| f64::from(kind as u8))));
             rows.set(searched, i, k, &both.map(|b| b.searched));

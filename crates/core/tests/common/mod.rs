@@ -2,15 +2,15 @@
 
 #![allow(dead_code)] // each test file uses its share
 
-use polypod_core::assembly::assemble;
-use polypod_core::coordinates::{self, MAX_COORDINATES, Set};
-use polypod_core::leg;
-use polypod_core::mechanism::Mechanism;
-use polypod_core::mobility;
-use polypod_core::real::Jet;
+use polypod_core::assembly::build::assemble;
+use polypod_core::kinematics::coordinate_sets::{self, MAX_COORDINATES, Set};
+use polypod_core::kinematics::leg;
+use polypod_core::mobility::degrees_of_freedom;
+use polypod_core::model::mechanism::Mechanism;
+use polypod_core::model::spec::Spec;
+use polypod_core::model::status::Status;
+use polypod_core::number::real::Jet;
 use polypod_core::spatial::{Mat3, Motion, Pose, Vec3};
-use polypod_core::spec::Spec;
-use polypod_core::status::Status;
 
 /// A small generator: tests must draw the same numbers everywhere.
 pub struct Draw(u64);
@@ -270,7 +270,8 @@ pub fn states(mech: &Mechanism, count: usize, seed: u64) -> Vec<Motion<f64>> {
             rotation: Mat3::from_rotation_vector(draw.vector() * 0.3) * mech.home.rotation,
             o: mech.home.o + draw.vector() * 0.1,
         };
-        let Some(pose) = mobility::project(&mech.constraints, mech.characteristic_length, &start) else {
+        let Some(pose) = degrees_of_freedom::project(&mech.constraints, mech.characteristic_length, &start)
+        else {
             continue;
         };
         let at = Set::Pose.values(mech, &pose);
@@ -284,7 +285,7 @@ pub fn states(mech: &Mechanism, count: usize, seed: u64) -> Vec<Motion<f64>> {
                 let (d, dd) = if k < 6 { motion[k] } else { (0.0, 0.0) };
                 Jet::new(at[k], d, dd)
             });
-            let state = coordinates::state(mech, &Set::Pose, &q, &given, 1.0, &pose);
+            let state = coordinate_sets::state(mech, &Set::Pose, &q, &given, 1.0, &pose);
             let speed = state.platform.twist.v.norm() + state.platform.twist.omega.norm();
             if state.status == Status::Ok && speed < 20.0 {
                 result.push(state.platform);

@@ -1,0 +1,172 @@
+//! The numbers of the geometry: points and axes of joints and rods; and mechanisms that vary with one of them \[T56\].
+
+use crate::assembly::build;
+use crate::kinematics::idle;
+use crate::model::mechanism::{Direction, Drive, Joint, Leg, Mechanism, Rod, Turning};
+use crate::model::spec::Axes;
+use crate::model::spec::JointKind;
+use crate::number::real::Dual;
+use crate::spatial::Vec3;
+
+/// What has points and axes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Place {
+    Joint(usize, Axes),
+    /// Of a slider.
+    Rail(usize),
+    Strut(usize),
+    Rod(usize),
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Vector {
+    Point,
+    /// A unit vector: a change along it is none.
+    Axis,
+    /// The same, of an F joint.
+    Normal,
+    /// One number.
+    Length,
+}
+
+/// One component of a point or an axis, in the axes of its body.
+#[derive(Clone, Copy, Debug)]
+pub struct Parameter {
+    pub place: Place,
+    pub vector: Vector,
+    pub component: usize,
+}
+
+impl Parameter {
+    /// `leg 1 base point_x`, `leg 1 rail axis_x`, `leg 1 strut length`, `rod L axis_z`.
+    #[must_use]
+    pub fn name(&self, mech: &Mechanism) -> String {
+        let place = match self.place {
+            Place::Joint(i, Axes::Base) => format!("leg {} base", mech.legs[i].name),
+            Place::Joint(i, Axes::Platform) => format!("leg {} platform", mech.legs[i].name),
+            Place::Rail(i) => format!("leg {} rail", mech.legs[i].name),
+            Place::Strut(i) => format!("leg {} strut", mech.legs[i].name),
+            Place::Rod(i) => format!("rod {}", mech.rods[i].name),
+        };
+        let vector = match self.vector {
+            Vector::Point => "point",
+            Vector::Axis => "axis",
+            Vector::Normal => "normal",
+            Vector::Length => return format!("{place} length"),
+        };
+        format!("{place} {vector}_{}", ["x", "y", "z"][self.component])
+    }
+}
+
+/// All of them in order: base joint and platform joint of each leg, of a slider its rail and strut; rods. A leg on a rod
+/// has the rod's axis, no own.
+#[must_use]
+pub fn parameters(mech: &Mechanism) -> Vec<Parameter> {
+    let joints = mech.legs.iter().enumerate().flat_map(|(i, leg)| {
+        let of_joint = |(side, joint, rod): (Axes, &Joint, Option<usize>)| {
+            let vectors: &[Vector] = match joint.kind {
+                _ if rod.is_some() => &[Vector::Point],
+                JointKind::Spherical => &[Vector::Point],
+                JointKind::Universal | JointKind::Revolute => &[Vector::Point, Vector::Axis],
+                JointKind::Fixed => &[Vector::Point, Vector::Axis, Vector::Normal],
+            };
+            (Place::Joint(i, side), vectors)
+        };
+        let slider: &[(Place, &[Vector])] = match leg.drive {
+            Drive::Telescope => &[],
+            Drive::Slider { .. } => {
+                &[(Place::Rail(i), &[Vector::Axis]), (Place::Strut(i), &[Vector::Length])]
+            }
+        };
+        let joints = [(Axes::Base, &leg.base, leg.rod), (Axes::Platform, &leg.platform, None)].map(of_joint);
+        joints.into_iter().chain(slider.to_vec())
+    });
+    let rods = (0..mech.rods.len()).map(|i| (Place::Rod(i), &[Vector::Point, Vector::Axis][..]));
+    let vectors = joints.chain(rods).flat_map(|(place, vectors)| vectors.iter().map(move |&v| (place, v)));
+    let count = |vector: Vector| if vector == Vector::Length { 1 } else { 3 };
+    vectors
+        .flat_map(|(place, vector)| {
+            (0..count(vector)).map(move |component| Parameter { place, vector, component })
+        })
+        .collect()
+}
+
+/// The mechanism with the derivative of all its parts by one of its numbers, zero for none. The home pose is kept, and with
+/// it the angle between legs on one rod.
+#[must_use]
+pub fn varied(mech: &Mechanism, by: Option<&Parameter>) -> Mechanism<Dual<f64>> {
+    let lift = |place: Place, vector: Vector, a: Vec3<f64>| -> Vec3<Dual<f64>> {
+        let Some(by) = by.filter(|by| (place, vector) == (by.place, by.vector)) else {
+            return Vec3::lift(a);
+        };
+        let step = [Vec3::X, Vec3::Y, Vec3::Z][by.component];
+        a.with_rate(if vector == Vector::Point { step } else { step - a * a.dot(step) })
+    };
+    let joint = |place: Place, joint: &Joint| Joint {
+        kind: joint.kind,
+        point: lift(place, Vector::Point, joint.point),
+        axis: joint.axis.map(|a| lift(place, Vector::Axis, a)),
+        normal: joint.normal.map(|a| lift(place, Vector::Normal, a)),
+        cone_axis: joint.cone_axis,
+    };
+    let rod = |(i, rod): (usize, &Rod)| Rod {
+        name: rod.name.clone(),
+        point: lift(Place::Rod(i), Vector::Point, rod.point),
+        axis: lift(Place::Rod(i), Vector::Axis, rod.axis),
+        body: rod.body.clone(),
+        leader: rod.leader,
+    };
+    let rods: Vec<_> = mech.rods.iter().enumerate().map(rod).collect();
+    let leg = |(i, leg): (usize, &Leg)| {
+        let mut base = joint(Place::Joint(i, Axes::Base), &leg.base);
+        if let Some(rod) = leg.rod {
+            base.axis = Some(rods[rod].axis);
+        }
+        let platform = joint(Place::Joint(i, Axes::Platform), &leg.platform);
+        let turning = build::turning(&base, &platform);
+        let drive = match leg.drive {
+            Drive::Telescope => Drive::Telescope,
+            Drive::Slider { rail, strut, branch } => {
+                let varies = by.is_some_and(|by| by.place == Place::Strut(i));
+                let strut = Dual::new(strut, f64::from(u8::from(varies)));
+                Drive::Slider { rail: lift(Place::Rail(i), Vector::Axis, rail), strut, branch }
+            }
+        };
+        Leg {
+            name: leg.name.clone(),
+            actuated: leg.actuated,
+            drive,
+            radius: leg.radius,
+            rod: leg.rod,
+            cylinder: leg.cylinder.clone(),
+            piston: leg.piston.clone(),
+            turning: turning.unwrap_or_else(|| Turning::Free(Vec3::lift(leg.turning.axis()))),
+            base,
+            platform,
+        }
+    };
+    let legs: Vec<_> = mech.legs.iter().enumerate().map(leg).collect();
+    let constraints = build::constraints(&legs, &rods, &mech.home);
+    let rows = constraints.iter().zip(&mech.mobility.constraints);
+    Mechanism {
+        name: mech.name.clone(),
+        platform: mech.platform.clone(),
+        gravity: mech.gravity,
+        efficiency: mech.efficiency,
+        linear_damping: mech.linear_damping,
+        angular_damping: mech.angular_damping,
+        load: mech.load.clone(),
+        home: mech.home,
+        tool_point: mech.tool_point,
+        tool_axis: mech.tool_axis,
+        independent: rows.filter(|(_, row)| row.independent).map(|(c, _)| *c).collect(),
+        characteristic_length: mech.characteristic_length,
+        mobility: mech.mobility.clone(),
+        limits: mech.limits.clone(),
+        idle: mech.idle.iter().map(|idle| idle::varied(idle, &legs)).collect(),
+        directions: Direction::of_all(&legs),
+        legs,
+        rods,
+        constraints,
+    }
+}

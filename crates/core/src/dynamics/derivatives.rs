@@ -1,0 +1,309 @@
+//! Derivatives of inverse dynamics by the motion and by the geometry: the same equations with dual numbers, one
+//! direction at a time \[T56\].
+//!
+//! Forces are the solution of a linear balance, so that what is differentiated is the balance with the forces kept:
+//! what it is off by, per unit of the direction, the forces must answer.
+
+use crate::assembly::geometric_parameters::{self, Parameter};
+use crate::dynamics::inverse_dynamics::{Answering, leg_wrench, load_in_base, own_wrench};
+use crate::kinematics::constraint;
+use crate::kinematics::coordinate_sets::{self, Following, Set, Values, Variation, Varying};
+use crate::kinematics::idle;
+use crate::kinematics::leg;
+use crate::model::mechanism::{Drive, Leg, Mechanism};
+use crate::model::spec::Axes;
+use crate::number::lanes::Lanes;
+use crate::number::real::{Constant, Dual, Jet, Real};
+use crate::spatial::{Acceleration, Motion, Pose, Twist, Vec3, Wrench};
+
+/// Numbers that a motion is varied in: six of the pose (o moves, and the platform turns about axes of the base through
+/// o), six of the twist, six of the acceleration.
+pub const DIRECTIONS: usize = 18;
+
+/// Active forces and multipliers, or how they change.
+pub type Column<V> = [V; 6];
+
+/// Inverse dynamics at a state, solved.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Solved<V: Real> {
+    pub platform: Motion<V>,
+    /// The load as it is given, with its axes.
+    pub load: (Wrench<V>, Axes),
+    pub forces: Column<V>,
+    pub answering: Answering<V>,
+}
+
+/// Derivatives of active forces and multipliers by the motion in each direction, the other numbers kept.
+#[inline(always)]
+pub(crate) fn by_motion<V: Lanes>(mech: &Mechanism, at: &Solved<V>) -> [Column<V>; DIRECTIONS] {
+    let mut columns = [[V::zero(); 6]; DIRECTIONS];
+    for direction in 0..DIRECTIONS {
+        let mut step = [V::zero(); DIRECTIONS];
+        step[direction] = V::one();
+        let varied = along(&at.platform, &step);
+        let (load, axes) = at.load;
+        let load = Wrench::new(load.force.with_rate(Vec3::zero()), load.torque.with_rate(Vec3::zero()));
+        let mut sum = own_wrench(mech, &varied, load_in_base(load, axes, &varied.pose));
+        let mut row = 0;
+        for (i, leg) in mech.legs.iter().enumerate() {
+            sum = sum + with_leg(mech, i, leg, &varied, &at.forces, &mut row);
+        }
+        let legs = mech.dof() - mech.idle.len();
+        for k in 0..mech.idle.len() {
+            let torque = Dual::new(at.forces[legs + k], V::zero());
+            sum = sum + idle::row(&mech.idle[k], &varied.pose) * torque;
+        }
+        for k in 0..mech.independent.len() {
+            let multiplier = Dual::new(at.forces[mech.dof() + k], V::zero());
+            sum = sum + constraint::row(&mech.independent[k], &varied.pose) * multiplier;
+        }
+        columns[direction] = at.answering.to(rate(sum));
+    }
+    columns
+}
+
+/// A leg's own wrench on the platform and that of its kept active force; `row` counts the legs that have one.
+#[inline(always)]
+pub(crate) fn with_leg<S: Constant<Dual<V>>, V: Lanes>(
+    mech: &Mechanism<S>,
+    index: usize,
+    leg: &Leg<S>,
+    varied: &Motion<Dual<V>>,
+    forces: &[V],
+    row: &mut usize,
+) -> Wrench<Dual<V>> {
+    let place = leg::place(leg, &varied.pose);
+    let mut sum = leg_wrench(mech, index, leg, &place, varied);
+    if leg.actuated {
+        sum = sum + leg::row(leg, &place.0) * Dual::new(forces[*row], V::zero());
+        *row += 1;
+    }
+    sum
+}
+
+/// The motion as it varies with a step in all directions.
+#[inline(always)]
+pub(crate) fn along<V: Lanes>(at: &Motion<V>, step: &[V; DIRECTIONS]) -> Motion<Dual<V>> {
+    let Motion { pose, twist, acceleration } = at;
+    Motion {
+        pose: pose.along(&Twist::new(part(step, 0), part(step, 1))),
+        twist: Twist::new(twist.v.with_rate(part(step, 2)), twist.omega.with_rate(part(step, 3))),
+        acceleration: Acceleration::new(
+            acceleration.a.with_rate(part(step, 4)),
+            acceleration.eps.with_rate(part(step, 5)),
+        ),
+    }
+}
+
+/// Three numbers of a step.
+#[inline(always)]
+fn part<V: Lanes>(step: &[V; DIRECTIONS], k: usize) -> Vec3<V> {
+    Vec3::new(step[3 * k], step[3 * k + 1], step[3 * k + 2])
+}
+
+/// The step that a motion varies by, in all directions.
+#[inline(always)]
+fn step_of<V: Lanes>(rates: &Pose<Jet<V>>, varied: &Variation<V>) -> [V; DIRECTIONS] {
+    let [now, moved] = [parts_of(rates), varied.pose];
+    // ω = ½ Σ x × x' over the columns of R, ε = ½ Σ x × x'' [T19]; a turn δθ makes δx = δθ × x.
+    let (mut turn, mut omega, mut eps) = (Vec3::zero(), Vec3::zero(), Vec3::zero());
+    for k in 0..3 {
+        turn = turn + now[0][k].cross(moved[0][k]);
+        omega = omega + now[0][k].cross(moved[1][k]) + moved[0][k].cross(now[1][k]);
+        eps = eps + now[0][k].cross(moved[2][k]) + moved[0][k].cross(now[2][k]);
+    }
+    let halves = [turn.scale(0.5), omega.scale(0.5), eps.scale(0.5)];
+    let mut step = [V::zero(); DIRECTIONS];
+    for order in 0..3 {
+        let (linear, angular) = (moved[order][3].array(), halves[order].array());
+        for i in 0..3 {
+            step[6 * order + i] = linear[i];
+            step[6 * order + 3 + i] = angular[i];
+        }
+    }
+    step
+}
+
+/// Columns of R, then o: values, rates, second rates.
+#[inline(always)]
+fn parts_of<V: Lanes>(pose: &Pose<Jet<V>>) -> [[Vec3<V>; 4]; 3] {
+    let [x, y, z] = pose.rotation.0;
+    let (vectors, mut all) = ([x, y, z, pose.o], [[Vec3::zero(); 4]; 3]);
+    for k in 0..4 {
+        let Vec3 { x, y, z } = vectors[k];
+        all[0][k] = Vec3::new(x.x, y.x, z.x);
+        all[1][k] = Vec3::new(x.d, y.d, z.d);
+        all[2][k] = Vec3::new(x.dd, y.dd, z.dd);
+    }
+    all
+}
+
+#[inline(always)]
+fn rate_of<V: Lanes>(a: Vec3<Dual<V>>) -> Vec3<V> {
+    Vec3 { x: a.x.d, y: a.y.d, z: a.z.d }
+}
+
+#[inline(always)]
+pub(crate) fn rate<V: Lanes>(w: Wrench<Dual<V>>) -> Wrench<V> {
+    Wrench::new(rate_of(w.force), rate_of(w.torque))
+}
+
+/// From the columns by motion to the derivative along a step.
+#[inline(always)]
+fn combined<V: Lanes>(by_motion: &[Column<V>; DIRECTIONS], step: &[V; DIRECTIONS]) -> Column<V> {
+    let mut sum = [V::zero(); 6];
+    for k in 0..DIRECTIONS {
+        for i in 0..6 {
+            sum[i] = by_motion[k][i].mul_add(step[k], sum[i]);
+        }
+    }
+    sum
+}
+
+/// The coordinates at a state, and how the motion follows them.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Coordinates<V: Real> {
+    q: Values<Jet<V>>,
+    pose: Pose<Jet<V>>,
+    pub following: Following<V>,
+}
+
+impl<V: Lanes> Coordinates<V> {
+    #[inline(always)]
+    pub(crate) fn at(
+        mech: &Mechanism,
+        set: &Set,
+        still: &Varied,
+        given: &[bool],
+        platform: &Motion<V>,
+    ) -> Self {
+        let q = coordinate_sets::along(mech, set, platform);
+        Coordinates { q, pose: platform.jets(), following: Following::at(&still.mech, &still.set, &q, given) }
+    }
+
+    /// What varies with a number of the set.
+    #[inline(always)]
+    pub(crate) fn varied(&self, still: &Varied, number: usize) -> Variation<V> {
+        V::apart(Varying { mech: &still.mech, set: &still.set, q: &self.q, number: Some(number) })
+    }
+
+    /// The derivative by a given coordinate that these vary with, or by its rate or second rate (order 1 or 2), the others
+    /// of these kept and dependent coordinates following.
+    #[inline(always)]
+    pub(crate) fn derivative(
+        &self,
+        by_motion: &[Column<V>; DIRECTIONS],
+        varied: &Variation<V>,
+        order: usize,
+    ) -> Column<V> {
+        combined(by_motion, &self.step(varied, order))
+    }
+
+    /// How the motion varies then.
+    #[inline(always)]
+    pub(crate) fn step(&self, varied: &Variation<V>, order: usize) -> [V; DIRECTIONS] {
+        step_of(&self.pose, &self.following.with(varied.by_rate(order)))
+    }
+
+    /// How the motion follows a number of the geometry.
+    #[inline(always)]
+    pub(crate) fn following_geometry(&self, by: &Varied) -> [V; DIRECTIONS] {
+        if !by.moves {
+            return [V::zero(); DIRECTIONS];
+        }
+        let variation = V::apart(Varying { mech: &by.mech, set: &by.set, q: &self.q, number: None });
+        step_of(&self.pose, &self.following.with(variation))
+    }
+}
+
+/// A mechanism that varies with one number of its geometry, or with none.
+#[derive(Clone, Debug)]
+pub(crate) struct Varied {
+    pub(crate) mech: Mechanism<Dual<f64>>,
+    set: Set<Dual<f64>>,
+    /// The legs and independent constraints that vary.
+    legs: Vec<usize>,
+    constraints: Vec<usize>,
+    /// Whether the motion varies with it.
+    moves: bool,
+}
+
+impl Varied {
+    /// Nothing varies.
+    pub(crate) fn none(mech: &Mechanism, set: &Set) -> Self {
+        let (legs, constraints) = (vec![], vec![]);
+        Varied {
+            mech: geometric_parameters::varied(mech, None),
+            set: set.lifted(),
+            legs,
+            constraints,
+            moves: false,
+        }
+    }
+
+    /// None if the set is none of the mechanism while it varies.
+    pub(crate) fn new(mech: &Mechanism, by: &Parameter, set: &Set) -> Option<Self> {
+        let mech = geometric_parameters::varied(mech, Some(by));
+        let varies = |a: Vec3<Dual<f64>>| a.array().iter().any(|x| x.d != 0.0);
+        let leg_varies = |leg: &Leg<Dual<f64>>| {
+            let drive = match leg.drive {
+                Drive::Telescope => false,
+                Drive::Slider { rail, strut, .. } => varies(rail) || strut.d != 0.0,
+            };
+            drive || varies(leg.base.point) || varies(leg.platform.point) || varies(leg.turning.axis())
+        };
+        let legs = (0..mech.legs.len()).filter(|&i| leg_varies(&mech.legs[i])).collect();
+        let constraint_varies = |k: &usize| {
+            let (c, p) = (&mech.independent[*k], &mech.independent[*k].partner);
+            let own = [c.base_point, c.platform_point, c.base_axis, c.platform_axis];
+            own.into_iter().chain([p.base_point, p.platform_point]).chain(p.turn.0).any(varies)
+        };
+        let constraints: Vec<_> = (0..mech.independent.len()).filter(constraint_varies).collect();
+        let set = set.varied(&mech)?;
+        Some(Varied { moves: set.varies() || !constraints.is_empty(), set, legs, constraints, mech })
+    }
+}
+
+/// Derivatives of active forces, multipliers and of the lengths of all legs by a number of the geometry, the given
+/// coordinates, their rates and second rates kept and dependent coordinates following.
+#[inline(always)]
+pub(crate) fn by_geometry<V: Lanes>(
+    varied: &Varied,
+    solved: &Solved<V>,
+    by_motion: &[Column<V>; DIRECTIONS],
+    at: &Coordinates<V>,
+    lengths: &mut [V],
+) -> Column<V> {
+    let Varied { mech, legs, constraints, moves, .. } = varied;
+    // With the motion kept only some legs vary, and the rods that they lead.
+    let still = along(&solved.platform, &[V::zero(); DIRECTIONS]);
+    let mut sum = Wrench::zero();
+    for &i in legs {
+        let mut row = 0;
+        for other in 0..i {
+            row += usize::from(mech.legs[other].actuated);
+        }
+        sum = sum + with_leg(mech, i, &mech.legs[i], &still, &solved.forces, &mut row);
+    }
+    for k in 0..mech.idle.len() {
+        let torque = Dual::new(solved.forces[mech.dof() - mech.idle.len() + k], V::zero());
+        sum = sum + idle::row(&mech.idle[k], &still.pose) * torque;
+    }
+    for &k in constraints {
+        let multiplier = Dual::new(solved.forces[mech.dof() + k], V::zero());
+        sum = sum + constraint::row(&mech.independent[k], &still.pose) * multiplier;
+    }
+    let (mut column, mut step) = (solved.answering.to(rate(sum)), [V::zero(); DIRECTIONS]);
+    if *moves {
+        step = at.following_geometry(varied);
+        let moved = combined(by_motion, &step);
+        for i in 0..6 {
+            column[i] = column[i] + moved[i];
+        }
+    }
+    let moving = along(&solved.platform, &step);
+    for (i, leg) in mech.legs.iter().enumerate() {
+        lengths[i] = leg::position(leg, &moving.pose).coordinate.d;
+    }
+    column
+}

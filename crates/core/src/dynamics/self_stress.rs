@@ -1,0 +1,612 @@
+//! Reactions where several will do: all that balance the links, the self-stresses that they differ by, and the two choices
+//! among them \[T46\] \[T47\]. For one state or for one in each lane, in room that is made once.
+
+use crate::dynamics::joint_reactions::{
+    Given, Joint, Place, constraint_wrench, pure, put_places, put_reactions, put_unbalanced,
+};
+use crate::dynamics::redundant_actuation::{self, Parted};
+use crate::kinematics::idle;
+use crate::model::mechanism::{Drive, Mechanism};
+use crate::model::spec::JointKind;
+use crate::number::lanes::{Lanes, any};
+use crate::number::real::{Mask, Real};
+use crate::numerics::householder::Orthogonal;
+use crate::spatial::{Motion, Pose, Vec3, Wrench};
+
+/// Least to greatest singular value of the platform's and the rods' balances below which the pose is singular.
+const SINGULAR: f64 = 1e-12;
+
+/// What may be left of the balances, relative to the reactions.
+const RESIDUAL: f64 = 1e-9;
+
+/// A component (torques divided by Λ) that no self-stress of size one changes by more is determinate: poses may miss their
+/// constraints by as much.
+const OPEN: f64 = 1e-6;
+
+/// Cosine of the angle between the couples of two self-stresses that counts as square, and the share of all couples that
+/// is rounding.
+const SQUARE: f64 = 1e-15;
+
+/// Far more turns of all pairs than any self-stresses need.
+const SWEEPS: usize = 60;
+
+/// Reactions of all joints in the order of [`joints`](crate::dynamics::joint_reactions::joints), each at its joint's point in base axes.
+#[derive(Clone, Debug)]
+pub struct Reactions {
+    pub places: Vec<Place<f64>>,
+    /// Universal joints carry no couple, as far as balance lets them \[T47\].
+    pub assumed: Vec<Wrench<f64>>,
+    /// The least in sum of squares \[T47\].
+    pub least: Vec<Wrench<f64>>,
+    /// Which components no self-stress changes: in base axes, and in joint axes.
+    pub determinate: Vec<[bool; 6]>,
+    pub determinate_in_joint: Vec<[bool; 6]>,
+    /// On the platform at o, of all legs that constrain it, without their active forces \[T48\].
+    pub constraint: Wrench<f64>,
+}
+
+/// All reactions that keep up a motion under load, or none at a singular pose. Torques count in the least sum of squares by
+/// `scale`, m.
+#[must_use]
+pub fn solve(
+    mech: &Mechanism,
+    joints: &[Joint],
+    platform: &Motion<f64>,
+    load: Wrench<f64>,
+    scale: f64,
+) -> Option<Reactions> {
+    let mut solver = Solver::new(mech, joints, scale);
+    let holds = if mech.is_redundant() {
+        solver.solve_redundant(platform, load)
+    } else {
+        solver.solve(platform, load)
+    };
+    let flags = |marks: &[[f64; 6]]| marks.iter().map(|marks| marks.map(|mark| mark > 0.0)).collect();
+    holds.then(|| Reactions {
+        determinate: flags(&solver.determinate),
+        determinate_in_joint: flags(&solver.determinate_in_joint),
+        constraint: solver.constraint,
+        places: solver.places,
+        assumed: solver.assumed,
+        least: solver.least,
+    })
+}
+
+/// Solves for the reactions at one state after the other.
+pub(crate) struct Solver<'a, V> {
+    mech: &'a Mechanism,
+    joints: &'a [Joint],
+    legs: Vec<LegBalance<V>>,
+    /// Wrenches on the platform that hold what nothing in the mechanism does: at o, torques divided by the characteristic
+    /// length.
+    props: Vec<Wrench<V>>,
+    given: Given<V>,
+    none: Given<V>,
+    /// The balances of platform and rods, unknown being the shares of what the legs can carry.
+    system: Orthogonal<V>,
+    unknowns: Vec<V>,
+    on_platform: Vec<Wrench<V>>,
+    unbalanced: Vec<V>,
+    choice: Choice<V>,
+    pub places: Vec<Place<V>>,
+    /// See [`Reactions`]; 1 for components that are determinate, else 0.
+    pub assumed: Vec<Wrench<V>>,
+    pub least: Vec<Wrench<V>>,
+    pub determinate: Vec<[V; 6]>,
+    pub determinate_in_joint: Vec<[V; 6]>,
+    pub constraint: Wrench<V>,
+}
+
+/// What a leg can do to the platform, at its b in base axes, torques divided by the characteristic length: one wrench that
+/// balances what is given in the leg, and those that its joints carry without any.
+struct LegBalance<V> {
+    /// What its joints leave free: the joint, from base to platform, and the component.
+    free: Vec<(usize, usize)>,
+    system: Orthogonal<V>,
+    /// The first of its columns in the whole.
+    first: usize,
+    /// The active force, where it is given.
+    push: V,
+    particular: Wrench<V>,
+    carried: Vec<Wrench<V>>,
+}
+
+impl<V: Lanes> LegBalance<V> {
+    fn new(joints: &[Joint], first: usize, pushed: bool) -> Self {
+        let mut free: Vec<_> = joints
+            .iter()
+            .enumerate()
+            .flat_map(|(j, joint)| joint.free.iter().map(move |&k| (j, k)))
+            .collect();
+        if joints[0].kind == JointKind::Spherical.letter() && joints[2].kind == joints[0].kind {
+            // Turning about itself is free at either end, and is one motion: neither end can hold it.
+            free.retain(|&at| at != (0, 4));
+        }
+        if pushed {
+            free.push((1, 1));
+        }
+        let carried = vec![Wrench::zero(); 6 - free.len()];
+        LegBalance {
+            system: Orthogonal::new(free.len(), 6),
+            free,
+            first,
+            push: V::zero(),
+            particular: Wrench::zero(),
+            carried,
+        }
+    }
+
+    /// A joint carries nothing where it is free: no power along its motion there, seen at b \[T44\].
+    #[inline(always)]
+    fn solve(&mut self, drive: Drive, places: &[Place<V>], [first, second]: [Wrench<V>; 2], length: f64) {
+        let end = places[2].point;
+        // What is given above the joint, at its point.
+        let at_base = second.moved(end - places[0].point);
+        let both = pure(at_base + first, length);
+        let given = match drive {
+            Drive::Telescope => [both, pure(second, length), Wrench::zero()],
+            Drive::Slider { .. } => [pure(at_base, length), both, Wrench::zero()],
+        };
+        let mut rhs = [V::zero(); 6];
+        for row in 0..self.free.len() {
+            let (j, k) = self.free[row];
+            let (axis, lever) = (places[j].axes.0[k % 3], end - places[j].point);
+            let motion = if k < 3 {
+                Wrench::new(axis, Vec3::zero())
+            } else {
+                Wrench::new(axis.cross(lever).scale(1.0 / length), axis)
+            };
+            let entries = motion.array();
+            for column in 0..6 {
+                self.system.set(row, column, entries[column]);
+            }
+            // The one force that a joint does not leave free but is given is that of an actuator.
+            rhs[row] = if k < 3 { axis.dot(given[j].force) + self.push } else { axis.dot(given[j].torque) };
+        }
+        self.system.factor();
+        self.system.solve(&mut rhs);
+        self.particular = Wrench::from_array(rhs);
+        for k in 0..self.carried.len() {
+            let mut x = [V::zero(); 6];
+            self.system.open(k, &mut x);
+            self.carried[k] = Wrench::from_array(x);
+        }
+    }
+
+    /// The wrench with the given shares of what it carries.
+    #[inline(always)]
+    fn with(&self, particular: bool, shares: &[V], length: f64) -> Wrench<V> {
+        let mut sum = if particular { self.particular } else { Wrench::zero() };
+        for k in 0..self.carried.len() {
+            sum = sum + self.carried[k] * shares[self.first + k];
+        }
+        Wrench::new(sum.force, sum.torque.scale(length))
+    }
+}
+
+impl<'a, V: Lanes> Solver<'a, V> {
+    /// Room for the states of a mechanism; `scale`, m, is what torques are divided by in the least sum of squares.
+    pub(crate) fn new(mech: &'a Mechanism, joints: &'a [Joint], scale: f64) -> Self {
+        let (rods, mut count, mut legs) = (mech.rods.len(), 0, Vec::new());
+        for i in 0..mech.legs.len() {
+            let pushed = mech.is_redundant() && mech.legs[i].actuated;
+            let leg = LegBalance::new(&joints[rods + 3 * i..rods + 3 * i + 3], count, pushed);
+            count += leg.carried.len();
+            legs.push(leg);
+        }
+        // Given forces of all actuators hold the platform in all its freedoms, the others in the idle ones.
+        let props = if mech.is_redundant() { mech.dof() } else { mech.idle.len() };
+        count += props;
+        let (all, rows) = (joints.len(), 6 + rods);
+        let free: usize = joints.iter().map(|joint| joint.free.len()).sum();
+        Solver {
+            mech,
+            joints,
+            legs,
+            props: vec![Wrench::zero(); props],
+            given: Given::none(mech),
+            none: Given::none(mech),
+            // Fewer unknowns than equations has a design that actuators do not control: it has no answer.
+            system: Orthogonal::new(rows, count.max(rows)),
+            unknowns: vec![V::zero(); count.max(rows)],
+            on_platform: vec![Wrench::zero(); mech.legs.len()],
+            unbalanced: vec![V::zero(); free + 6],
+            choice: Choice::new(joints, count.saturating_sub(rows), mech.characteristic_length, scale),
+            places: vec![Place::nowhere(); all],
+            assumed: vec![Wrench::zero(); all],
+            least: vec![Wrench::zero(); all],
+            determinate: vec![[V::zero(); 6]; all],
+            determinate_in_joint: vec![[V::zero(); 6]; all],
+            constraint: Wrench::zero(),
+        }
+    }
+
+    /// Finds all reactions that keep up a motion under load; tells where there are any, which is not at singular poses.
+    #[inline(always)]
+    pub(crate) fn solve(&mut self, platform: &Motion<V>, load: Wrench<V>) -> Mask<V> {
+        let mech = self.mech;
+        self.given.set(mech, platform, load);
+        for k in 0..mech.idle.len() {
+            self.props[k] = Wrench::new(Vec3::zero(), idle::axis(&mech.idle[k], &platform.pose));
+        }
+        self.solve_given(&platform.pose)
+    }
+
+    /// Balances what is given.
+    #[inline(always)]
+    fn solve_given(&mut self, pose: &Pose<V>) -> Mask<V> {
+        let mech = self.mech;
+        put_places(mech, pose, &mut self.places);
+        self.set_up(pose.o);
+        self.system.factor();
+        let regular = self.system.reciprocal_condition();
+        self.system.solve(&mut self.unknowns);
+        if !mech.is_redundant() {
+            self.add_idle_torques();
+        }
+        self.put_on_platform(true);
+        put_reactions(mech, &self.places, &self.given, &self.on_platform, &mut self.least);
+        let holds = self.holds(pose.o, regular);
+
+        for k in 0..self.choice.count {
+            self.system.open(k, &mut self.unknowns);
+            self.put_on_platform(false);
+            let stress = &mut self.choice.stresses[k * self.places.len()..(k + 1) * self.places.len()];
+            put_reactions(mech, &self.places, &self.none, &self.on_platform, stress);
+        }
+        self.choice.turn(&self.places);
+        self.assumed.copy_from_slice(&self.least);
+        self.choice.make_least(&self.places, false, &mut self.least);
+        self.choice.make_least(&self.places, true, &mut self.assumed);
+        self.put_determinate();
+        self.constraint = constraint_wrench(mech, &self.places, pose, &self.assumed);
+        holds
+    }
+
+    /// What the props of idle freedoms do is given from now on.
+    #[inline(always)]
+    fn add_idle_torques(&mut self) {
+        let (length, first) = (self.mech.characteristic_length, self.props_from());
+        for k in 0..self.props.len() {
+            let Wrench { force, torque } = self.props[k] * self.unknowns[first + k];
+            self.given.platform = self.given.platform + Wrench::new(force, torque.scale(length));
+        }
+    }
+
+    /// The column of the first prop.
+    #[inline(always)]
+    fn props_from(&self) -> usize {
+        self.legs.last().map_or(0, |leg| leg.first + leg.carried.len())
+    }
+
+    /// The balances of the platform at o and of the rods about their lines; those of the legs hold whatever their shares
+    /// are \[T46\].
+    #[inline(always)]
+    fn set_up(&mut self, o: Vec3<V>) {
+        let (mech, length) = (self.mech, self.mech.characteristic_length);
+        let (rods, pure_lever) = (mech.rods.len(), 1.0 / length);
+        let own = pure(self.given.platform, length).array();
+        for x in &mut self.unknowns {
+            *x = V::zero();
+        }
+        for row in 0..6 {
+            self.unknowns[row] = -own[row];
+        }
+        let first = self.props_from();
+        for k in 0..self.props.len() {
+            let prop = self.props[k].array();
+            for row in 0..6 {
+                self.system.set(row, first + k, prop[row]);
+            }
+            for r in 0..rods {
+                self.system.set(6 + r, first + k, V::zero());
+            }
+        }
+        for r in 0..rods {
+            self.unknowns[6 + r] = self.places[r].axes.0[0].dot(pure(self.given.rods[r], length).torque);
+        }
+        for i in 0..mech.legs.len() {
+            let below = rods + 3 * i;
+            let [cylinder, piston] = self.given.legs[i];
+            let leg = &mut self.legs[i];
+            leg.solve(mech.legs[i].drive, &self.places[below..below + 3], self.given.legs[i], length);
+            let (base, end) = (self.places[below].point, self.places[below + 2].point);
+            let e = (end - o).scale(pure_lever);
+            let particular = leg.particular.moved(e).array();
+            for row in 0..6 {
+                self.unknowns[row] = self.unknowns[row] - particular[row];
+            }
+            for k in 0..leg.carried.len() {
+                let column = leg.carried[k].moved(e).array();
+                for row in 0..6 {
+                    self.system.set(row, leg.first + k, column[row]);
+                }
+            }
+            for r in 0..rods {
+                let (axis, point) = (self.places[r].axes.0[0], self.places[r].point);
+                let on_it = mech.legs[i].rod == Some(r);
+                let lever = (end - point).scale(pure_lever);
+                for k in 0..leg.carried.len() {
+                    let torque = leg.carried[k].moved(lever).torque;
+                    let entry = if on_it { axis.dot(torque) } else { V::zero() };
+                    self.system.set(6 + r, leg.first + k, entry);
+                }
+                if on_it {
+                    let own = pure(piston.moved(end - point) + cylinder.moved(base - point), length);
+                    let torque = own.torque - leg.particular.moved(lever).torque;
+                    self.unknowns[6 + r] = self.unknowns[6 + r] + axis.dot(torque);
+                }
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn put_on_platform(&mut self, particular: bool) {
+        let length = self.mech.characteristic_length;
+        for i in 0..self.legs.len() {
+            self.on_platform[i] = self.legs[i].with(particular, &self.unknowns, length);
+        }
+    }
+
+    /// Whether the pose is regular, and the reactions found balance every link.
+    #[inline(always)]
+    fn holds(&mut self, o: Vec3<V>, regular: V) -> Mask<V> {
+        let (mech, length) = (self.mech, self.mech.characteristic_length);
+        let (given, rows) = (&self.given, &mut self.unbalanced);
+        put_unbalanced(mech, self.joints, &self.places, o, given, &self.least, rows);
+        let (mut left, mut size) = (V::zero(), V::zero());
+        for x in rows {
+            left = x.mul_add(*x, left);
+        }
+        size = add_square(pure(given.platform, length), size);
+        for w in &self.least {
+            size = add_square(pure(*w, length), size);
+        }
+        let least = if mech.mobility.uncontrolled == 0 { SINGULAR } else { f64::INFINITY };
+        // Nothing times what is finite is nothing.
+        let known = V::select((size * V::zero()).at_most(V::zero()), V::one(), V::zero());
+        let balanced = V::select(left.at_most(size.scale(RESIDUAL * RESIDUAL)), known, V::zero());
+        V::select(regular.greater(V::lit(least)), balanced, V::zero()).greater(V::zero())
+    }
+
+    #[inline(always)]
+    fn put_determinate(&mut self) {
+        let length = self.mech.characteristic_length;
+        for j in 0..self.joints.len() {
+            let (mut base, mut seen) = ([V::zero(); 6], [V::zero(); 6]);
+            for s in 0..self.choice.count {
+                let stress = self.choice.stresses[s * self.joints.len() + j];
+                let parts = pure(stress, length).array();
+                let seen_parts = pure(self.places[j].seen(stress), length).array();
+                // The root of the sum is the most that a self-stress of size one can have, whatever the basis.
+                for k in 0..6 {
+                    base[k] = parts[k].mul_add(parts[k], base[k]);
+                    seen[k] = seen_parts[k].mul_add(seen_parts[k], seen[k]);
+                }
+            }
+            for k in 0..6 {
+                let (one, zero, open) = (V::one(), V::zero(), V::lit(OPEN * OPEN));
+                self.determinate[j][k] = V::select(base[k].at_most(open), one, zero);
+                self.determinate_in_joint[j][k] = V::select(seen[k].at_most(open), one, zero);
+            }
+        }
+    }
+}
+
+impl Solver<'_, f64> {
+    /// The same where actuators are redundant: with their least forces \[T72\], which leave the platform's freedoms nothing to
+    /// hold. What the props hold shows as an error.
+    pub(crate) fn solve_redundant(&mut self, platform: &Motion<f64>, load: Wrench<f64>) -> bool {
+        let (mech, pose) = (self.mech, &platform.pose);
+        let Some(parted) = Parted::at(mech, pose).filter(|parted| parted.regular) else { return false };
+        let found = redundant_actuation::inverse_dynamics(mech, platform, load, &[]);
+        let mut forces = found.forces.iter();
+        for (leg, balance) in mech.legs.iter().zip(&mut self.legs) {
+            balance.push = if leg.actuated { forces.next().copied().unwrap_or(f64::NAN) } else { 0.0 };
+        }
+        self.given.set(mech, platform, load);
+        for (idle, torque) in mech.idle.iter().zip(&found.multipliers) {
+            self.given.platform = self.given.platform + idle::row(idle, pose) * *torque;
+        }
+        self.props = parted.freedoms(mech.idle.len());
+        self.solve_given(pose)
+    }
+}
+
+/// The sum and the squares of a wrench's components.
+#[inline(always)]
+fn add_square<V: Real>(w: Wrench<V>, mut sum: V) -> V {
+    let components = w.array();
+    for k in 0..6 {
+        sum = components[k].mul_add(components[k], sum);
+    }
+    sum
+}
+
+/// Self-stresses, and the rules by which they are added \[T47\].
+struct Choice<V> {
+    count: usize,
+    /// How many joints there are, and which of them are universal.
+    joints: usize,
+    universal: Vec<usize>,
+    /// What couples are divided by, and torques in the least sum of squares, m.
+    length: f64,
+    scale: f64,
+    /// The reactions of all joints, of one self-stress after the other.
+    stresses: Vec<Wrench<V>>,
+    /// Their couples in the universal joints, and the sum of squares of each one's; zero if it is as good as none.
+    couples: Vec<V>,
+    sizes: Vec<V>,
+    /// Products of the self-stresses.
+    system: Orthogonal<V>,
+    shares: Vec<V>,
+}
+
+impl<V: Lanes> Choice<V> {
+    fn new(joints: &[Joint], count: usize, length: f64, scale: f64) -> Self {
+        let is_universal = |&j: &usize| joints[j].kind == JointKind::Universal.letter();
+        let universal: Vec<usize> = (0..joints.len()).filter(is_universal).collect();
+        Choice {
+            count,
+            joints: joints.len(),
+            length,
+            scale,
+            stresses: vec![Wrench::zero(); count * joints.len()],
+            couples: vec![V::zero(); count * universal.len()],
+            universal,
+            sizes: vec![V::zero(); count],
+            system: Orthogonal::new(count, count),
+            shares: vec![V::zero(); count],
+        }
+    }
+
+    #[inline(always)]
+    fn stress(&self, k: usize) -> &[Wrench<V>] {
+        &self.stresses[k * self.joints..(k + 1) * self.joints]
+    }
+
+    /// Turns the self-stresses into others, orthonormal as they are, whose couples are square to one another.
+    #[inline(always)]
+    fn turn(&mut self, places: &[Place<V>]) {
+        let (width, mut all) = (self.universal.len(), V::zero());
+        for s in 0..self.count {
+            for u in 0..width {
+                let couple = self.couple(places, u, self.stress(s));
+                self.couples[s * width + u] = couple;
+                all = couple.mul_add(couple, all);
+            }
+        }
+        for _ in 0..SWEEPS {
+            let mut turned = V::zero();
+            for j in 1..self.count {
+                for i in 0..j {
+                    turned = turned.most(self.make_square(i, j, all));
+                }
+            }
+            if !any(turned) {
+                break;
+            }
+        }
+        for s in 0..self.count {
+            let size = self.product_of_couples(s, s);
+            self.sizes[s] = V::select(size.greater(V::lit(OPEN * OPEN)), size, V::zero());
+        }
+    }
+
+    #[inline(always)]
+    fn product_of_couples(&self, i: usize, j: usize) -> V {
+        let (width, mut sum) = (self.universal.len(), V::zero());
+        for u in 0..width {
+            sum = self.couples[i * width + u].mul_add(self.couples[j * width + u], sum);
+        }
+        sum
+    }
+
+    /// Turns a pair where its couples are not square yet, and tells where.
+    #[inline(always)]
+    fn make_square(&mut self, i: usize, j: usize, all: V) -> V {
+        let (a, b) = (self.product_of_couples(i, i), self.product_of_couples(j, j));
+        let product = self.product_of_couples(i, j);
+        let counts = a.least(b).greater(all.scale(SQUARE * SQUARE));
+        let cosine = V::select(counts, product * product, V::zero());
+        let turns = cosine.greater((a * b).scale(SQUARE * SQUARE));
+        // The lesser turn that does it: t = tan of its angle, t² + 2 ζ t = 1.
+        let zeta = (b - a) / (product + product);
+        let t = zeta.signum() / (zeta.abs() + zeta.mul_add(zeta, V::one()).sqrt());
+        let cos = V::one() / t.mul_add(t, V::one()).sqrt();
+        let sin = cos * t;
+        let width = self.universal.len();
+        for u in 0..width {
+            let (p, q) = (self.couples[i * width + u], self.couples[j * width + u]);
+            self.couples[i * width + u] = V::select(turns, cos * p - sin * q, p);
+            self.couples[j * width + u] = V::select(turns, sin * p + cos * q, q);
+        }
+        for joint in 0..self.joints {
+            let (at, other) = (i * self.joints + joint, j * self.joints + joint);
+            let (mut p, mut q) = (self.stresses[at].array(), self.stresses[other].array());
+            for k in 0..6 {
+                let (x, y) = (p[k], q[k]);
+                p[k] = V::select(turns, cos * x - sin * y, x);
+                q[k] = V::select(turns, sin * x + cos * y, y);
+            }
+            self.stresses[at] = Wrench::from_array(p);
+            self.stresses[other] = Wrench::from_array(q);
+        }
+        V::select(turns, V::one(), V::zero())
+    }
+
+    /// Adds self-stresses until the reactions are least, but first until the couples in universal joints are, if asked to. A
+    /// second time takes off the rounding of the first.
+    #[inline(always)]
+    fn make_least(&mut self, places: &[Place<V>], couples_first: bool, reactions: &mut [Wrench<V>]) {
+        if self.count == 0 {
+            return;
+        }
+        for k in 0..self.count {
+            for s in 0..self.count {
+                // Self-stresses that change couples are left out of the second choice.
+                let kept = if couples_first { self.sizes[k].most(self.sizes[s]) } else { V::zero() };
+                let unit = V::lit(f64::from(u8::from(k == s)));
+                let product = self.product(self.stress(k), self.stress(s));
+                self.system.set(k, s, V::select(kept.greater(V::zero()), unit, product));
+            }
+        }
+        self.system.factor();
+        for _ in 0..2 {
+            if couples_first {
+                self.set_shares_of_couples(places, reactions);
+                self.take_off(reactions);
+            }
+            for s in 0..self.count {
+                let kept = if couples_first { self.sizes[s] } else { V::zero() };
+                let product = self.product(self.stress(s), reactions);
+                self.shares[s] = V::select(kept.greater(V::zero()), V::zero(), product);
+            }
+            self.system.solve(&mut self.shares);
+            self.take_off(reactions);
+        }
+    }
+
+    /// How much of each self-stress there is in the couples.
+    #[inline(always)]
+    fn set_shares_of_couples(&mut self, places: &[Place<V>], reactions: &[Wrench<V>]) {
+        let width = self.universal.len();
+        for s in 0..self.count {
+            let mut sum = V::zero();
+            for u in 0..width {
+                let couple = self.couple(places, u, reactions);
+                sum = self.couples[s * width + u].mul_add(couple, sum);
+            }
+            let changes = self.sizes[s].greater(V::zero());
+            self.shares[s] = V::select(changes, sum / self.sizes[s], V::zero());
+        }
+    }
+
+    #[inline(always)]
+    fn take_off(&self, reactions: &mut [Wrench<V>]) {
+        for s in 0..self.count {
+            let (stress, share) = (self.stress(s), self.shares[s]);
+            for j in 0..self.joints {
+                reactions[j] = reactions[j] - stress[j] * share;
+            }
+        }
+    }
+
+    /// The couple in a universal joint, divided by the characteristic length.
+    #[inline(always)]
+    fn couple(&self, places: &[Place<V>], universal: usize, reactions: &[Wrench<V>]) -> V {
+        let j = self.universal[universal];
+        places[j].axes.0[2].dot(reactions[j].torque).scale(1.0 / self.length)
+    }
+
+    /// The product whose square the second choice makes least.
+    #[inline(always)]
+    fn product(&self, a: &[Wrench<V>], b: &[Wrench<V>]) -> V {
+        let (mut forces, mut torques) = (V::zero(), V::zero());
+        for j in 0..self.joints {
+            forces = forces + a[j].force.dot(b[j].force);
+            torques = torques + a[j].torque.dot(b[j].torque);
+        }
+        forces + torques.scale(1.0 / (self.scale * self.scale))
+    }
+}

@@ -1,0 +1,648 @@
+//! Paths of complex solutions as equations change, such as squared leg lengths, several side by side \[T29\].
+
+use crate::forward_kinematics::newton::{Asked, FOLD_PIVOTS, System, system};
+use crate::kinematics::leg;
+use crate::model::mechanism::Mechanism;
+use crate::model::spec::Axes;
+use crate::number::complex::Complex;
+use crate::number::lanes::{self, Lanes, Row, Task, WIDTH};
+use crate::number::real::{Ordered, Real};
+use crate::numerics::gauss::{Solved, solve, solve_all};
+use crate::spatial::{Mat3, Pose, Vec3};
+
+pub type C = Complex<f64>;
+
+/// Coordinates, as pure numbers, of a pose beyond which a path is taken to go to infinity: no real pose is there.
+pub const INFINITE: f64 = 1e7;
+
+/// The same for a path that cannot be followed further in double precision.
+const FAR: f64 = 300.0;
+
+/// The same below which a pose may be a real one.
+const NEARBY: f64 = 100.0;
+
+/// Share of a path that is tried first.
+const FIRST_STEP: f64 = 0.3;
+
+/// Share of a path below which a step is not made shorter.
+const SMALLEST_STEP: f64 = 1e-13;
+
+/// Share of a path that may be left where it ends in a singular pose.
+const NEAR_END: f64 = 1e-9;
+
+/// Newton steps at the end of a path.
+const LAST_STEPS: usize = 40;
+
+/// Size of a Newton step, as a pure number, from which the next one is rounding.
+const ROUNDING: f64 = 1e-14;
+
+/// The same by which it has converged quadratically.
+const CONVERGED: f64 = 1e-9;
+
+/// The same that no step on the way need fall below.
+const CLOSE: f64 = 1e-8;
+
+/// How a path ends.
+#[derive(Clone, Copy, Debug)]
+pub enum End {
+    Regular(Pose<C>),
+    /// At a solution where several paths end.
+    Singular(Pose<C>),
+    Infinite,
+    /// On the way: what it leads to is not known.
+    Lost,
+}
+
+impl End {
+    /// The pose, if it is a regular one.
+    #[must_use]
+    pub fn regular(self) -> Option<Pose<C>> {
+        match self {
+            End::Regular(pose) => Some(pose),
+            _ => None,
+        }
+    }
+}
+
+/// Six equations that change from t = 0 to t = 1.
+pub trait Family {
+    fn mech(&self) -> &Mechanism;
+
+    /// Whether solutions that differ by an idle spin are one \[T71\].
+    fn spins(&self) -> bool;
+
+    /// The equations at a place, and the rates at which their residuals fall there. Must be `#[inline(always)]`.
+    fn at<V: Lanes>(&self, place: &Place<Complex<V>>, t: V) -> (System<Complex<V>>, [Complex<V>; 6]);
+}
+
+/// What is asked of the legs along a straight path.
+#[derive(Clone, Copy, Debug)]
+pub struct Lengths<'a> {
+    pub mech: &'a Mechanism,
+    pub from: [Asked<C>; 6],
+    pub to: [Asked<C>; 6],
+}
+
+impl Family for Lengths<'_> {
+    fn mech(&self) -> &Mechanism {
+        self.mech
+    }
+
+    fn spins(&self) -> bool {
+        !self.mech.idle.is_empty()
+    }
+
+    #[inline(always)]
+    fn at<V: Lanes>(&self, place: &Place<Complex<V>>, t: V) -> (System<Complex<V>>, [Complex<V>; 6]) {
+        let Lengths { mech, from, to } = self;
+        let unit = 1.0 / (mech.characteristic_length * mech.characteristic_length);
+        let pose = place.pose();
+        let mut asked = [Asked::none(); 6];
+        let mut rates = [Complex::<V>::zero(); 6];
+        let mut i = 0;
+        for leg in &mech.legs {
+            if leg.actuated {
+                let (square, square_rate) = between(from[i].square, to[i].square, t);
+                let (place, place_rate) = between(from[i].place, to[i].place, t);
+                asked[i] = Asked { place, square };
+                let rate = Asked { place: place_rate, square: square_rate };
+                let r = asked[i].vector(leg, leg::vectors(leg, &pose).1);
+                rates[i] = Asked::change(leg, r, &rate).scale(unit);
+                i += 1;
+            }
+        }
+        (system(mech, &pose, &asked), rates)
+    }
+}
+
+/// The paths of the solutions of such equations.
+#[derive(Clone, Copy, Debug)]
+pub struct Path<F> {
+    pub family: F,
+    /// Error of a predicted step, as a pure number.
+    pub precision: f64,
+}
+
+/// Where one of several solutions on their way is.
+#[derive(Clone, Copy, Debug)]
+struct Traveller {
+    /// Which of them it is.
+    start: usize,
+    t: f64,
+    /// The next step.
+    h: f64,
+    /// Size of the Newton step that corrected the last prediction.
+    error: f64,
+    /// t and h of the step before.
+    before: (f64, f64),
+}
+
+impl Traveller {
+    fn new(start: usize) -> Self {
+        Traveller { start, t: 0.0, h: FIRST_STEP, error: 0.0, before: (0.0, 0.0) }
+    }
+
+    /// Whether a second Newton step is as much smaller than the first as it must be.
+    fn contracts(&self, size: f64, precision: f64) -> bool {
+        size <= (0.1 * precision * precision.max(self.error)).max(CLOSE)
+    }
+
+    /// Goes on if the error of a prediction permits it, and sets the next step: errors grow with its fifth power.
+    fn judge(&mut self, error: f64, precision: f64) -> bool {
+        let good = error <= precision;
+        let factor = 0.8 * (precision / error).powf(0.2);
+        let factor = if factor.is_nan() { 0.25 } else { factor.clamp(0.25, 4.0) };
+        if good {
+            *self = Traveller {
+                t: self.t + self.h,
+                h: self.h * factor,
+                error,
+                before: (self.t, self.h),
+                ..*self
+            };
+        } else {
+            self.h *= factor.min(0.5);
+        }
+        good
+    }
+
+    /// Whether it has been at the end for a step already.
+    fn waits(&self) -> bool {
+        self.t >= 1.0 && self.h == 0.0
+    }
+
+    /// Takes the last step back.
+    fn back(&mut self) {
+        let (t, h) = self.before;
+        *self = Traveller { t, h: 0.25 * h, error: 0.0, before: (t, 0.25 * h), ..*self };
+    }
+}
+
+impl<F: Family> Path<F> {
+    /// Follows the path from solutions at t = 0 by the classical Runge-Kutta method and Newton corrections.
+    #[must_use]
+    pub fn follow(&self, starts: &[Pose<C>]) -> Vec<End> {
+        let mut ends = vec![End::Lost; starts.len()];
+        let mut waiting = starts.iter().enumerate();
+        let mut travellers: [Option<Traveller>; WIDTH] = [None; WIDTH];
+        let (mut place, mut rate) = (ZERO, ZERO);
+        let mut before = (place, rate);
+        let mut at = Evaluated::default();
+        loop {
+            for (k, traveller) in
+                travellers.iter_mut().enumerate().filter(|(_, traveller)| traveller.is_none())
+            {
+                if let Some((start, pose)) = waiting.next() {
+                    *traveller = Some(Traveller::new(start));
+                    self.unspun(Place::of(pose)).put(&mut place, k);
+                }
+            }
+            if travellers.iter().all(Option::is_none) {
+                return ends;
+            }
+            // The second correction of the step before, and the rate for the next.
+            self.evaluate(&place, &row(&travellers, |who| who.t), &mut at);
+            rate.clone_from(&at.rate);
+            for (k, traveller) in travellers.iter_mut().enumerate() {
+                let Some(who) = traveller else { continue };
+                let arrived = who.t >= 1.0 && at.size[k] <= CONVERGED && at.pivots[k] > FOLD_PIVOTS;
+                if !arrived && who.waits() {
+                    (ends[who.start], *traveller) = (self.end(who, &Place::get(&place, k)), None);
+                    continue;
+                }
+                if who.contracts(at.size[k], self.precision) {
+                    add(&mut place, &at.correction, k);
+                } else {
+                    who.back();
+                    copy(&before.0, &mut place, k);
+                    copy(&before.1, &mut rate, k);
+                }
+                who.h = who.h.min(1.0 - who.t);
+                if arrived {
+                    (ends[who.start], *traveller) = (End::Regular(Place::get(&place, k).pose()), None);
+                }
+            }
+            before.0.clone_from(&place);
+            before.1.clone_from(&rate);
+            let (t, h) = (row(&travellers, |who| who.t), row(&travellers, |who| who.h));
+            let mut next = self.predict(&place, &rate, &t, &h, &mut at);
+            self.evaluate(&next, &later(&t, &h, 1.0), &mut at);
+            add_all(&mut next, &at.correction, &ONE);
+            for (k, traveller) in travellers.iter_mut().enumerate() {
+                let Some(who) = traveller else { continue };
+                if who.judge(at.size[k], self.precision) {
+                    copy(&next, &mut place, k);
+                }
+                let here = Place::get(&place, k);
+                if self.family.spins() {
+                    self.unspun(here).put(&mut place, k);
+                }
+                if !(here.size(self.family.mech()) < INFINITE) {
+                    (ends[who.start], *traveller) = (End::Infinite, None);
+                } else if who.t < 1.0 && who.h <= SMALLEST_STEP {
+                    (ends[who.start], *traveller) = (self.end(who, &here), None);
+                }
+            }
+        }
+    }
+
+    fn unspun(&self, place: Place<C>) -> Place<C> {
+        if self.family.spins() { place.unspun(self.family.mech()) } else { place }
+    }
+
+    /// The classical Runge-Kutta step.
+    fn predict(&self, place: &Block, rate: &Block, t: &Row, h: &Row, at: &mut Evaluated) -> Block {
+        let middle = later(t, h, 0.5);
+        let [half, sixth, third] = [2.0, 6.0, 3.0].map(|n| h.map(|h| h / n));
+        let (mut sum, mut stage) = (*place, *place);
+        add_all(&mut sum, rate, &sixth);
+        add_all(&mut stage, rate, &half);
+        for (share, next) in [(&third, &half), (&third, h)] {
+            self.evaluate(&stage, &middle, at);
+            add_all(&mut sum, &at.rate, share);
+            stage = *place;
+            add_all(&mut stage, &at.rate, next);
+        }
+        self.evaluate(&stage, &later(t, h, 1.0), at);
+        add_all(&mut sum, &at.rate, &sixth);
+        sum
+    }
+
+    /// What the path comes to where it cannot be followed further, or paths seem to meet.
+    fn end(&self, who: &Traveller, place: &Place<C>) -> End {
+        let mech = self.family.mech();
+        let size = place.size(mech);
+        if who.t < 1.0 - NEAR_END {
+            return if size > FAR { End::Infinite } else { End::Lost };
+        }
+        let (mut place, mut last) = (*place, f64::NAN);
+        for _ in 0..LAST_STEPS {
+            let (System { residual, matrix }, _) = self.family.at(&place, 1.0);
+            let step = solve(matrix, residual.map(|f| -f)).x;
+            place = place + place.along(mech, &step);
+            last = step_size(mech, &place, &step);
+            if !(last > ROUNDING) {
+                break;
+            }
+        }
+        // Where paths meet, Newton steps may be small by chance: the matrix tells.
+        let (System { residual, matrix }, _) = self.family.at(&place, 1.0);
+        let determined = size > NEARBY || solve(matrix, residual).pivots > FOLD_PIVOTS;
+        let regular = who.t >= 1.0 && last <= CONVERGED && determined;
+        if regular { End::Regular(place.pose()) } else { End::Singular(place.pose()) }
+    }
+
+    /// Newton steps and rates at places.
+    fn evaluate(&self, place: &Block, t: &Row, result: &mut Evaluated) {
+        lanes::dispatch(Evaluation { family: &self.family, place, t, result });
+    }
+}
+
+/// A complex pose with its rotation as a quaternion of any size but zero, so that steps are sums \[T29\].
+#[derive(Clone, Copy, Debug)]
+pub struct Place<T> {
+    pub q: [T; 4],
+    pub o: Vec3<T>,
+}
+
+impl<T: Real> Place<T> {
+    #[must_use]
+    #[inline(always)]
+    pub fn pose(&self) -> Pose<T> {
+        let [w, x, y, z] = self.q;
+        let share = T::lit(2.0) / (w * w + x * x + y * y + z * z);
+        let (sx, sy, sz) = (x * share, y * share, z * share);
+        let (wx, wy, wz) = (w * sx, w * sy, w * sz);
+        let (xx, xy, xz) = (x * sx, x * sy, x * sz);
+        let (yy, yz, zz) = (y * sy, y * sz, z * sz);
+        let one = T::one();
+        let rotation = Mat3::from_columns(
+            Vec3::new(one - (yy + zz), xy + wz, xz - wy),
+            Vec3::new(xy - wz, one - (xx + zz), yz + wx),
+            Vec3::new(xz + wy, yz - wx, one - (xx + yy)),
+        );
+        Pose { rotation, o: self.o }
+    }
+
+    /// The change of the place along (v/Λ, ω): `q' = ω q/2`.
+    #[inline(always)]
+    pub(crate) fn along(&self, mech: &Mechanism, x: &[T; 6]) -> Self {
+        let [w, i, j, k] = self.q;
+        let (omega, vector) = (Vec3::new(x[3], x[4], x[5]).scale(0.5), Vec3::new(i, j, k));
+        let turned = omega * w + omega.cross(vector);
+        let o = Vec3::new(x[0], x[1], x[2]).scale(mech.characteristic_length);
+        Place { q: [-omega.dot(vector), turned.x, turned.y, turned.z], o }
+    }
+}
+
+impl<T: Real> std::ops::Add for Place<T> {
+    type Output = Self;
+    fn add(self, b: Self) -> Self {
+        Place { q: std::array::from_fn(|i| self.q[i] + b.q[i]), o: self.o + b.o }
+    }
+}
+
+impl Place<C> {
+    /// From the largest of four products of the quaternion with each of its parts.
+    pub(crate) fn of(pose: &Pose<C>) -> Self {
+        let m = pose.rotation.rows();
+        let one = C::one();
+        let (w, x) = (one + m[0][0] + m[1][1] + m[2][2], one + m[0][0] - m[1][1] - m[2][2]);
+        let (y, z) = (one - m[0][0] + m[1][1] - m[2][2], one - m[0][0] - m[1][1] + m[2][2]);
+        let (wx, wy, wz) = (m[2][1] - m[1][2], m[0][2] - m[2][0], m[1][0] - m[0][1]);
+        let (xy, xz, yz) = (m[0][1] + m[1][0], m[0][2] + m[2][0], m[1][2] + m[2][1]);
+        let products = [[w, wx, wy, wz], [wx, x, xy, xz], [wy, xy, y, yz], [wz, xz, yz, z]];
+        let largest =
+            (0..4).fold(0, |a, b| if products[b][b].norm() > products[a][a].norm() { b } else { a });
+        let share = one / products[largest][largest].sqrt();
+        Place { q: products[largest].map(|p| p * share), o: pose.o }
+    }
+
+    /// The place after that imaginary idle spin which makes the quaternion least: spins are no part of a solution, and
+    /// imaginary ones let it grow without bounds \[T71\].
+    fn unspun(self, mech: &Mechanism) -> Self {
+        let [idle] = &mech.idle[..] else { return self };
+        let [w, x, y, z] = self.q;
+        let (u, v) = (Vec3::lift(idle.axis), Vec3::new(x, y, z));
+        // q u or u q: multiplied twice it is -q, so that q has two parts that it makes ±i times as large.
+        let across = if idle.side == Axes::Platform { v.cross(u) } else { u.cross(v) };
+        let Vec3 { x, y, z } = u * w + across;
+        let (i, turned) = (C::new(0.0, 1.0), [-u.dot(v), x, y, z]);
+        let parts =
+            [-i, i].map(|i| std::array::from_fn::<C, 4, _>(|k| (self.q[k] + i * turned[k]).scale(0.5)));
+        let [a, b] = parts.map(|part| part.iter().map(|e| e.norm_sqr()).sum::<f64>().sqrt());
+        let share = (b / a).sqrt();
+        if !(share > 0.0 && share.is_finite()) {
+            return self;
+        }
+        let [first, second] = parts;
+        let q = std::array::from_fn(|k| first[k].scale(share) + second[k].scale(1.0 / share));
+        // The line stays where it is: o turns about it.
+        let (before, after) = (self.pose(), Place { q, ..self }.pose());
+        let point = Vec3::lift(idle.point);
+        let o = match idle.side {
+            Axes::Platform => self.o + before.rotation * point - after.rotation * point,
+            Axes::Base => point - after.rotation * before.rotation.transpose_mul(point - self.o),
+        };
+        Place { q, o }
+    }
+
+    /// How large its coordinates are, as a pure number: of o, and of the rotation, by |q|²/|q·q|.
+    fn size(&self, mech: &Mechanism) -> f64 {
+        let q = self.q.iter().fold(C::zero(), |sum, &e| sum + e * e).norm();
+        let turned = self.q.iter().map(|e| e.norm_sqr()).sum::<f64>() / q;
+        (modulus(self.o) / mech.characteristic_length).max(turned)
+    }
+
+    fn get(block: &Block, k: usize) -> Self {
+        let [w, x, y, z, a, b, c] = std::array::from_fn(|i| C::new(block[2 * i][k], block[2 * i + 1][k]));
+        Place { q: [w, x, y, z], o: Vec3::new(a, b, c) }
+    }
+
+    fn put(&self, block: &mut Block, k: usize) {
+        let numbers = self.q.into_iter().chain(self.o.array()).flat_map(|z| [z.re, z.im]);
+        for (row, number) in block.iter_mut().zip(numbers) {
+            row[k] = number;
+        }
+    }
+}
+
+/// The size of a step (v/Λ, ω), relative to how far off o is.
+#[inline(always)]
+fn step_size<T: Ordered>(mech: &Mechanism, place: &Place<Complex<T>>, x: &[Complex<T>; 6]) -> T {
+    let mut sum = T::zero();
+    for z in x {
+        sum = sum + z.norm_sqr();
+    }
+    let far = place.o.x.norm_sqr() + place.o.y.norm_sqr() + place.o.z.norm_sqr();
+    sum.sqrt() / (T::one() + far.sqrt().scale(1.0 / mech.characteristic_length))
+}
+
+/// The length of the real and imaginary parts together.
+#[must_use]
+pub fn modulus(v: Vec3<C>) -> f64 {
+    (v.x.norm_sqr() + v.y.norm_sqr() + v.z.norm_sqr()).sqrt()
+}
+
+/// Real and imaginary parts of the q and o of each: places, steps of them, or rates.
+type Block = [Row; 14];
+
+const ZERO: Block = [[0.0; WIDTH]; 14];
+const ONE: Row = [1.0; WIDTH];
+
+fn row(travellers: &[Option<Traveller>; WIDTH], part: impl Fn(&Traveller) -> f64) -> Row {
+    std::array::from_fn(|k| travellers[k].as_ref().map_or(0.0, &part))
+}
+
+fn later(t: &Row, h: &Row, share: f64) -> Row {
+    std::array::from_fn(|k| t[k] + share * h[k])
+}
+
+fn add_all(place: &mut Block, step: &Block, share: &Row) {
+    for (row, step) in place.iter_mut().zip(step) {
+        for k in 0..WIDTH {
+            row[k] += share[k] * step[k];
+        }
+    }
+}
+
+fn add(place: &mut Block, step: &Block, k: usize) {
+    for (row, step) in place.iter_mut().zip(step) {
+        row[k] += step[k];
+    }
+}
+
+fn copy(from: &Block, to: &mut Block, k: usize) {
+    for (to, from) in to.iter_mut().zip(from) {
+        to[k] = from[k];
+    }
+}
+
+/// Newton steps at places and their sizes, and the rates of the places along the path.
+#[derive(Clone, Copy, Debug, Default)]
+struct Evaluated {
+    correction: Block,
+    size: Row,
+    pivots: Row,
+    rate: Block,
+}
+
+struct Evaluation<'a, F> {
+    family: &'a F,
+    place: &'a Block,
+    t: &'a Row,
+    result: &'a mut Evaluated,
+}
+
+impl<F: Family> Task for Evaluation<'_, F> {
+    #[inline(always)]
+    fn run<V: Lanes>(self) {
+        let mech = self.family.mech();
+        let mut k = 0;
+        while k < WIDTH {
+            let place: Place<Complex<V>> = load(self.place, k);
+            let (System { mut residual, matrix }, rates) = self.family.at(&place, V::load(&self.t[k..]));
+            for f in &mut residual {
+                *f = -*f;
+            }
+            let Solved { x: [step, rate], pivots, .. } = solve_all(matrix, [residual, rates]);
+            step_size(mech, &place, &step).store(&mut self.result.size[k..]);
+            pivots.store(&mut self.result.pivots[k..]);
+            store(&place.along(mech, &step), &mut self.result.correction, k);
+            store(&place.along(mech, &rate), &mut self.result.rate, k);
+            k += V::WIDTH;
+        }
+    }
+}
+
+/// A number at t, and its rate.
+#[inline(always)]
+fn between<V: Lanes>(from: C, to: C, t: V) -> (Complex<V>, Complex<V>) {
+    let change = to - from;
+    let at = Complex::new(
+        V::lit(change.re).mul_add(t, V::lit(from.re)),
+        V::lit(change.im).mul_add(t, V::lit(from.im)),
+    );
+    (at, Complex::new(V::lit(change.re), V::lit(change.im)))
+}
+
+#[inline(always)]
+fn load<V: Lanes>(block: &Block, k: usize) -> Place<Complex<V>> {
+    let mut parts = [Complex::<V>::zero(); 7];
+    for i in 0..7 {
+        parts[i] = Complex::new(V::load(&block[2 * i][k..]), V::load(&block[2 * i + 1][k..]));
+    }
+    let [w, x, y, z, a, b, c] = parts;
+    Place { q: [w, x, y, z], o: Vec3::new(a, b, c) }
+}
+
+#[inline(always)]
+fn store<V: Lanes>(place: &Place<Complex<V>>, block: &mut Block, k: usize) {
+    let ([w, x, y, z], [a, b, c]) = (place.q, place.o.array());
+    let parts = [w, x, y, z, a, b, c];
+    for i in 0..7 {
+        parts[i].re.store(&mut block[2 * i][k..]);
+        parts[i].im.store(&mut block[2 * i + 1][k..]);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::cell::RefCell;
+
+    use super::*;
+    use crate::common;
+    use crate::number::lanes::tests::on_each_width;
+    use crate::numerics::random::Draw;
+
+    #[derive(Clone, Copy)]
+    struct Each<'a> {
+        family: &'a Lengths<'a>,
+        place: &'a Block,
+        t: &'a Row,
+        results: &'a RefCell<Vec<(bool, Evaluated)>>,
+    }
+
+    impl Task for Each<'_> {
+        #[inline(always)]
+        fn run<V: Lanes>(self) {
+            let mut result = Evaluated::default();
+            Evaluation { family: self.family, place: self.place, t: self.t, result: &mut result }.run::<V>();
+            self.results.borrow_mut().push((V::FUSED, result));
+        }
+    }
+
+    fn complex_places(draw: &mut Draw) -> [Place<C>; WIDTH] {
+        let mut place =
+            || Place { q: std::array::from_fn(|_| draw.complex()), o: draw.vector(Draw::complex) };
+        std::array::from_fn(|_| place())
+    }
+
+    #[test]
+    fn paths_side_by_side_are_those_alone_bit_by_bit() {
+        let mut draw = Draw(5);
+        for mech in common::mechanisms() {
+            let [from, to] = [(); 2]
+                .map(|()| std::array::from_fn(|_| Asked { place: draw.complex(), square: draw.complex() }));
+            let family = Lengths { mech: &mech, from, to };
+            let (places, mut block) = (complex_places(&mut draw), ZERO);
+            for (k, place) in places.iter().enumerate() {
+                place.put(&mut block, k);
+            }
+            let t: Row = std::array::from_fn(|_| draw.number());
+            let results = RefCell::new(Vec::new());
+            on_each_width(Each { family: &family, place: &block, t: &t, results: &results });
+            let all = results.into_inner();
+            let bits = |e: &Evaluated| {
+                let blocks = [e.correction, e.rate].map(|b| b.map(|row| row.map(f64::to_bits)));
+                (blocks, [e.size, e.pivots].map(|row| row.map(f64::to_bits)))
+            };
+            for (fused, result) in &all {
+                let first = all.iter().find(|(f, _)| f == fused).expect("itself");
+                assert_eq!(bits(result), bits(&first.1), "fused: {fused}");
+            }
+            let all: Vec<Evaluated> = all.into_iter().map(|(_, result)| result).collect();
+            // Lane 3 is what the equations of that place alone say.
+            let at = |a: C, b: C| a + (b - a).scale(t[3]);
+            let asked = std::array::from_fn(|i| Asked {
+                place: at(from[i].place, to[i].place),
+                square: at(from[i].square, to[i].square),
+            });
+            let System { residual, matrix } = system(&mech, &places[3].pose(), &asked);
+            let step = solve(matrix, residual.map(|f| -f)).x;
+            let correction = places[3].along(&mech, &step);
+            let found = Place::get(&all[0].correction, 3);
+            let error = found.q.iter().zip(correction.q).map(|(&a, b)| (a - b).norm()).fold(0.0, f64::max);
+            assert!(
+                error < 1e-9 * correction.q.iter().map(|q| q.norm()).fold(1.0, f64::max),
+                "{}",
+                mech.name
+            );
+        }
+    }
+
+    #[test]
+    fn a_quaternion_of_any_size_is_its_rotation() {
+        for place in complex_places(&mut Draw(11)) {
+            let pose = place.pose();
+            let again = Place::of(&pose).pose();
+            for (a, b) in pose.rotation.0.into_iter().zip(again.rotation.0) {
+                assert!(modulus(a - b) < 1e-12 * (1.0 + modulus(a)));
+            }
+            let products = pose.rotation.transpose() * pose.rotation;
+            assert!(modulus(products.0[1] - Vec3::lift(Vec3::Y)) < 1e-11);
+        }
+        // Unit quaternion of a turn by 0.6 about z, twice as large.
+        let (s, c) = 0.3_f64.sin_cos();
+        let place = Place { q: [2.0 * c, 0.0, 0.0, 2.0 * s].map(C::lit), o: Vec3::zero() };
+        let turned = Mat3::from_rotation_vector(Vec3::Z * 0.6);
+        for (a, b) in place.pose().rotation.0.into_iter().zip(turned.0) {
+            assert!(modulus(a - Vec3::lift(b)) < 1e-15);
+        }
+    }
+
+    #[test]
+    fn the_rate_of_a_place_is_that_of_its_pose() {
+        let mech = common::published();
+        let mut draw = Draw(3);
+        let [place, ..] = complex_places(&mut draw);
+        let twist: [C; 6] = std::array::from_fn(|_| draw.complex());
+        let rate = place.along(&mech, &twist);
+        let h = 1e-6;
+        let moved = |h: f64| {
+            let step = Place { q: rate.q.map(|q| q.scale(h)), o: rate.o.scale(h) };
+            (place + step).pose()
+        };
+        let omega = Vec3::new(twist[3], twist[4], twist[5]);
+        let (after, before) = (moved(h), moved(-h));
+        for k in 0..3 {
+            let difference = (after.rotation.0[k] - before.rotation.0[k]).scale(0.5 / h);
+            let expected = omega.cross(place.pose().rotation.0[k]);
+            assert!(modulus(difference - expected) < 1e-6 * (1.0 + modulus(expected)));
+        }
+        let speed = (after.o - before.o).scale(0.5 / h);
+        assert!(
+            modulus(speed - Vec3::new(twist[0], twist[1], twist[2]).scale(mech.characteristic_length)) < 1e-8
+        );
+    }
+}

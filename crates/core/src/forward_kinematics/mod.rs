@@ -1,0 +1,6 @@
+pub mod assembly_modes;
+pub mod gauss_newton;
+pub mod homotopy;
+pub mod newton;
+pub mod newton_lanes;
+pub mod start_system;

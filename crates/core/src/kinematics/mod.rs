@@ -1,0 +1,9 @@
+pub mod chart;
+pub mod constraint;
+pub mod coordinate_sets;
+pub mod idle;
+pub mod jacobian;
+pub mod leg;
+pub mod passive_joints;
+pub mod quadratic_forms;
+pub mod rows;

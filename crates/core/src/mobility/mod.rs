@@ -1,0 +1,4 @@
+pub mod degrees_of_freedom;
+pub mod screw_systems;
+pub mod singularity;
+pub mod singularity_distance;

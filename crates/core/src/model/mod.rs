@@ -1,0 +1,4 @@
+pub mod limit;
+pub mod mechanism;
+pub mod spec;
+pub mod status;

@@ -1,0 +1,5 @@
+pub mod complex;
+pub mod lanes;
+pub mod outlined;
+pub mod real;
+pub mod trig;

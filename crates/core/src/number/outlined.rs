@@ -1,0 +1,126 @@
+//! A number of many parts for maps that are long: how a pose with its rates varies. What it takes to multiply two is a
+//! function of its own, called rather than copied into the map, which would be some hundred thousand instructions for each
+//! kind of register.
+
+use std::ops::{Add, Div, Mul, Neg, Sub};
+
+use crate::number::lanes::{Lanes, Work};
+use crate::number::real::{Constant, Dual, Jet, Mask, Real, Trig};
+
+/// The number that it is: rates and second rates along a motion, with a derivative of each.
+type Parts<V> = Jet<Dual<V>>;
+
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Called<V>(pub Parts<V>);
+
+/// Functions of one or two numbers that are called.
+macro_rules! called {
+    ($($work:ident($a:ident, $b:ident) -> $result:ty: $value:expr;)*) => {$(
+        struct $work<V>(Parts<V>, Parts<V>);
+
+        impl<V: Lanes> Work<V> for $work<V> {
+            type Result = $result;
+
+            #[inline(always)]
+            fn run(self) -> $result {
+                let $work($a, $b) = self;
+                $value
+            }
+        }
+    )*};
+}
+called! {
+    Product(a, b) -> Parts<V>: a * b;
+    Quotient(a, b) -> Parts<V>: a / b;
+    Root(a, _b) -> Parts<V>: a.sqrt();
+    SineAndCosine(a, _b) -> (Parts<V>, Parts<V>): a.sin_cos();
+    ArcCosine(a, _b) -> Parts<V>: a.acos();
+    Angle(y, x) -> Parts<V>: y.atan2(x);
+}
+
+impl<V: Lanes> Add for Called<V> {
+    type Output = Self;
+    #[inline(always)]
+    fn add(self, b: Self) -> Self {
+        Called(self.0 + b.0)
+    }
+}
+
+impl<V: Lanes> Sub for Called<V> {
+    type Output = Self;
+    #[inline(always)]
+    fn sub(self, b: Self) -> Self {
+        Called(self.0 - b.0)
+    }
+}
+
+impl<V: Lanes> Mul for Called<V> {
+    type Output = Self;
+    #[inline(always)]
+    fn mul(self, b: Self) -> Self {
+        Called(V::apart(Product(self.0, b.0)))
+    }
+}
+
+impl<V: Lanes> Div for Called<V> {
+    type Output = Self;
+    #[inline(always)]
+    fn div(self, b: Self) -> Self {
+        Called(V::apart(Quotient(self.0, b.0)))
+    }
+}
+
+impl<V: Lanes> Neg for Called<V> {
+    type Output = Self;
+    #[inline(always)]
+    fn neg(self) -> Self {
+        Called(-self.0)
+    }
+}
+
+impl<V: Lanes> Real for Called<V> {
+    type Value = V;
+    #[inline(always)]
+    fn lit(x: f64) -> Self {
+        Called(Jet::lit(x))
+    }
+    #[inline(always)]
+    fn value(self) -> V {
+        self.0.value()
+    }
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        Called(V::apart(Root(self.0, self.0)))
+    }
+    #[inline(always)]
+    fn scale(self, x: f64) -> Self {
+        Called(self.0.scale(x))
+    }
+    #[inline(always)]
+    fn select(choose: Mask<Self>, a: Self, b: Self) -> Self {
+        Called(Jet::select(choose, a.0, b.0))
+    }
+}
+
+impl<V: Lanes> Trig for Called<V> {
+    #[inline(always)]
+    fn sin_cos(self) -> (Self, Self) {
+        let (sine, cosine) = V::apart(SineAndCosine(self.0, self.0));
+        (Called(sine), Called(cosine))
+    }
+    #[inline(always)]
+    fn acos(self) -> Self {
+        Called(V::apart(ArcCosine(self.0, self.0)))
+    }
+    #[inline(always)]
+    fn atan2(self, x: Self) -> Self {
+        Called(V::apart(Angle(self.0, x.0)))
+    }
+}
+
+impl<V: Lanes> Constant<Called<V>> for Dual<f64> {
+    #[inline(always)]
+    fn lift(self) -> Called<V> {
+        Called(self.lift())
+    }
+}

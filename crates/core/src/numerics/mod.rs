@@ -1,0 +1,5 @@
+pub mod gauss;
+pub mod hermite_roots;
+pub mod householder;
+pub mod random;
+pub mod svd;

@@ -1,0 +1,2 @@
+pub mod streaming_stores;
+pub mod threads;

@@ -1,0 +1,4 @@
+pub mod fit_orientation;
+pub mod flood_fill;
+pub mod lattice_steps;
+pub mod length_lattice;
