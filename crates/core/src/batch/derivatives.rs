@@ -9,6 +9,7 @@ use crate::dynamics::inverse_dynamics::{Answering, resultant};
 use crate::dynamics::regressor::{self, Regressor};
 use crate::kinematics::coordinate_sets::{DEPENDENT_PIVOTS, MAX_COORDINATES, Set};
 use crate::kinematics::leg;
+use crate::kinematics::rows::RowNumbers;
 use crate::model::mechanism::Mechanism;
 use crate::model::status::Status;
 use crate::number::lanes::Lanes;
@@ -279,7 +280,7 @@ fn put<V: Lanes, const N: usize>(
         answers.put(forces, i * width + k, [if leg.actuated { column[row] } else { V::zero() }]);
         row += usize::from(leg.actuated);
     }
-    for i in 0..mech.independent.len() {
-        answers.put(multipliers, i * width + k, [column[mech.dof() + i]]);
+    for (i, row) in RowNumbers::of(mech).constraints().enumerate() {
+        answers.put(multipliers, i * width + k, [column[row]]);
     }
 }

@@ -4,8 +4,8 @@ use super::block::{self, Answers, At, Codes, Operation};
 use super::checks::{finite, pose_at, solved, with_leg, with_motion, within_limits, within_limits_of};
 use super::{FieldId, States, Table, redundant};
 use crate::dynamics::inverse_dynamics::{self, Balance};
-use crate::kinematics::idle;
 use crate::kinematics::leg;
+use crate::kinematics::rows::{self, RowNumbers};
 use crate::limits::margins::Seen;
 use crate::mobility::degrees_of_freedom;
 use crate::model::mechanism::Mechanism;
@@ -88,11 +88,12 @@ impl Operation<3> for InverseDynamics<'_> {
             .then(with_motion(mech, &platform, legs))
             .unless(finite(&load.array()), Status::InvalidInput);
         put_forces(mech, answers, forces, &f);
-        for k in 0..mech.independent.len() {
-            answers.put(multipliers, k, [f[mech.dof() + k]]);
+        let rows = RowNumbers::of(mech);
+        for (k, row) in rows.constraints().enumerate() {
+            answers.put(multipliers, k, [f[row]]);
         }
-        for k in 0..mech.idle.len() {
-            answers.put(torques, k, [f[mech.dof() - mech.idle.len() + k]]);
+        for (k, row) in rows.idle().enumerate() {
+            answers.put(torques, k, [f[row]]);
         }
         within_limits_of(mech, pose, &mut seen, solved(mech, &f, pivots, codes))
     }
@@ -200,16 +201,9 @@ impl Operation<9> for Power<'_> {
         let damping = inverse_dynamics::damping_wrench(mech, twist).power(twist);
         let (f, pivots) = inverse_dynamics::inverse_dynamics(mech, &platform, wrench);
         let regular = solved(mech, &f, pivots, Codes::ok()).are(Status::Ok);
-        let (mut actuators, mut row) = (V::zero(), 0);
-        for leg in &mech.legs {
-            if leg.actuated {
-                actuators = actuators + leg::row(leg, &leg::position(leg, pose)).power(twist) * f[row];
-                row += 1;
-            }
-        }
-        for idle in &mech.idle {
-            actuators = actuators + idle::row(idle, pose).power(twist) * f[row];
-            row += 1;
+        let mut actuators = V::zero();
+        for (k, row) in rows::of(mech).take(RowNumbers::of(mech).idle().end).enumerate() {
+            actuators = actuators + row.wrench(pose).power(twist) * f[k];
         }
         actuators = V::select(regular, actuators, V::lit(f64::NAN));
         // What the efficiency takes: actuators serve the platform's term of [Eq. 42] 1/η times.

@@ -11,7 +11,7 @@ use crate::dynamics::redundant_actuation::{self, Column, Followed, Parted, Solve
 use crate::dynamics::regressor::Regressor;
 use crate::kinematics::coordinate_sets::{DEPENDENT_PIVOTS, MAX_COORDINATES, Set};
 use crate::kinematics::leg;
-use crate::kinematics::rows::{all_hessians, all_rows};
+use crate::kinematics::rows::{RowNumbers, all_hessians, all_rows};
 use crate::limits::margins::{Binding, Seen};
 use crate::model::limit::Measure;
 use crate::model::mechanism::Mechanism;
@@ -157,7 +157,7 @@ pub(super) fn power<const N: usize>(
         let found = redundant_actuation::inverse_dynamics(mech, &platform, wrench, &[]);
         let rates = all_rows(mech, pose);
         let rates = rates.iter().map(|row| Wrench::from_array(*row).power(twist));
-        let driven = found.forces.len() + mech.idle.len();
+        let driven = RowNumbers::of(mech).idle().end;
         let forces = found.forces.iter().chain(&found.multipliers).take(driven);
         let actuators: f64 = rates.zip(forces).map(|(rate, force)| rate * force).sum();
         let own = (wrench + inverse_dynamics::platform_wrench(mech, &platform)).power(twist);
@@ -354,12 +354,12 @@ fn put<const N: usize>(
     [forces, multipliers]: [FieldId; 2],
     columns: &[Column],
 ) {
-    let n = mech.actuated().count();
+    let numbers = RowNumbers::of(mech);
     for (k, column) in columns.iter().enumerate() {
-        for (leg, force) in of_all_legs(mech, &column[..n]).into_iter().enumerate() {
+        for (leg, force) in of_all_legs(mech, &column[numbers.actuated()]).into_iter().enumerate() {
             rows.set(forces, i, leg * columns.len() + k, &[force]);
         }
-        for (c, multiplier) in column[n + mech.idle.len()..].iter().enumerate() {
+        for (c, multiplier) in column[numbers.constraints()].iter().enumerate() {
             rows.set(multipliers, i, c * columns.len() + k, &[*multiplier]);
         }
     }

@@ -5,6 +5,7 @@ use nalgebra::{DMatrix, DVector};
 use crate::dynamics::redundant_actuation;
 use crate::dynamics::regressor::{Parameter, Regressor};
 use crate::kinematics::jacobian;
+use crate::kinematics::rows::RowNumbers;
 use crate::mobility::degrees_of_freedom;
 use crate::mobility::singularity;
 use crate::model::mechanism::Mechanism;
@@ -100,7 +101,7 @@ fn random_state(mech: &Mechanism, draw: &mut Draw) -> Option<Motion<f64>> {
         rotation: Mat3::from_rotation_vector(draw.vector(Draw::number) * SPREAD) * mech.home.rotation,
         o: mech.home.o + draw.vector(Draw::number) * (SPREAD * size),
     };
-    let driven = mech.rows() - mech.independent.len();
+    let driven = RowNumbers::of(mech).idle().end;
     let rates: Vec<f64> = (0..driven).map(|_| draw.number() * (gravity * size).sqrt()).collect();
     let accelerations: Vec<f64> = (0..driven).map(|_| draw.number() * gravity).collect();
     let pose = degrees_of_freedom::project(&mech.constraints, size, &start)?;

@@ -10,6 +10,7 @@ use crate::kinematics::constraint;
 use crate::kinematics::coordinate_sets::{self, Following, Set, Values, Variation, Varying};
 use crate::kinematics::idle;
 use crate::kinematics::leg;
+use crate::kinematics::rows::{self, RowNumbers};
 use crate::model::mechanism::{Drive, Leg, Mechanism};
 use crate::model::spec::Axes;
 use crate::number::lanes::Lanes;
@@ -48,14 +49,8 @@ pub(crate) fn by_motion<V: Lanes>(mech: &Mechanism, at: &Solved<V>) -> [Column<V
         for (i, leg) in mech.legs.iter().enumerate() {
             sum = sum + with_leg(mech, i, leg, &varied, &at.forces, &mut row);
         }
-        let legs = mech.dof() - mech.idle.len();
-        for k in 0..mech.idle.len() {
-            let torque = Dual::new(at.forces[legs + k], V::zero());
-            sum = sum + idle::row(&mech.idle[k], &varied.pose) * torque;
-        }
-        for k in 0..mech.independent.len() {
-            let multiplier = Dual::new(at.forces[mech.dof() + k], V::zero());
-            sum = sum + constraint::row(&mech.independent[k], &varied.pose) * multiplier;
+        for (other, k) in rows::others(mech).zip(row..) {
+            sum = sum + other.wrench(&varied.pose) * Dual::new(at.forces[k], V::zero());
         }
         columns[direction] = at.answering.to(rate(sum));
     }
@@ -285,12 +280,12 @@ pub(crate) fn by_geometry<V: Lanes>(
         }
         sum = sum + with_leg(mech, i, &mech.legs[i], &still, &solved.forces, &mut row);
     }
-    for k in 0..mech.idle.len() {
-        let torque = Dual::new(solved.forces[mech.dof() - mech.idle.len() + k], V::zero());
-        sum = sum + idle::row(&mech.idle[k], &still.pose) * torque;
+    let rows = RowNumbers::of(mech);
+    for (idle, k) in mech.idle.iter().zip(rows.idle()) {
+        sum = sum + idle::row(idle, &still.pose) * Dual::new(solved.forces[k], V::zero());
     }
     for &k in constraints {
-        let multiplier = Dual::new(solved.forces[mech.dof() + k], V::zero());
+        let multiplier = Dual::new(solved.forces[rows.constraints().start + k], V::zero());
         sum = sum + constraint::row(&mech.independent[k], &still.pose) * multiplier;
     }
     let (mut column, mut step) = (solved.answering.to(rate(sum)), [V::zero(); DIRECTIONS]);

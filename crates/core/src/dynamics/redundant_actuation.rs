@@ -8,10 +8,9 @@ use nalgebra::{DMatrix, DVector};
 use crate::dynamics::derivatives::{self, Coordinates, DIRECTIONS, Varied};
 use crate::dynamics::inverse_dynamics::{load_in_base, own_wrench, resultant};
 use crate::kinematics::constraint;
-use crate::kinematics::idle;
 use crate::kinematics::leg;
 use crate::kinematics::quadratic_forms::quadratic;
-use crate::kinematics::rows::{all_hessians, pure_rows};
+use crate::kinematics::rows::{self, Row, all_hessians, pure_rows};
 use crate::mobility::degrees_of_freedom;
 use crate::model::mechanism::Mechanism;
 use crate::model::spec::Axes;
@@ -60,9 +59,11 @@ impl Parted {
         let scale = mech.characteristic_length;
         let rows = pure_rows(mech, pose, scale);
         let n = mech.actuated().count();
-        let idle = mech.idle.iter().map(|_| scale);
-        let units = idle.chain(mech.independent.iter().map(|c| constraint::length(c, scale))).collect();
-        Self::of(&rows, n, units, scale)
+        let unit = |row| match row {
+            Row::Constraint(c) => constraint::length(c, scale),
+            Row::Leg(_) | Row::Idle(_) => scale,
+        };
+        Self::of(&rows, n, rows::others(mech).map(unit).collect(), scale)
     }
 
     /// The same of the given rows, the first `n` of them those of legs.
@@ -298,8 +299,7 @@ fn answered(
             of_legs.push(leg::row(leg, &leg::position(leg, &varied.pose)).power(&y).d);
         }
     }
-    let idle = mech.idle.iter().map(|idle| idle::row(idle, &varied.pose));
-    let rows = idle.chain(mech.independent.iter().map(|c| constraint::row(c, &varied.pose)));
+    let rows = rows::others(mech).map(|row| row.wrench(&varied.pose));
     let mut of_others = Vec::with_capacity(multipliers.len());
     for (row, multiplier) in rows.zip(multipliers) {
         sum = sum + row * Dual::new(*multiplier, 0.0);

@@ -8,7 +8,7 @@ use crate::forward_kinematics::newton::{
 };
 use crate::kinematics::constraint;
 use crate::kinematics::leg;
-use crate::kinematics::rows::pure_rows;
+use crate::kinematics::rows::{self, Row, pure_rows};
 use crate::mobility::degrees_of_freedom::RANK_TOLERANCE;
 use crate::model::mechanism::{Leg, Mechanism};
 use crate::model::status::Status;
@@ -64,13 +64,14 @@ impl Misses {
             let r = asked.vector(leg, r);
             (pure_row(Wrench::at(e, r.unit()), scale), r.norm() - asked.square.sqrt())
         };
-        let (rows, short): (Vec<[f64; 6]>, Vec<f64>) = mech.actuated().zip(asked).map(of_leg).unzip();
-        let idle = mech.idle.iter().map(|_| 0.0);
-        let off = mech.independent.iter().map(|c| constraint::value(c, pose) * constraint::length(c, scale));
+        let (of_legs, short): (Vec<[f64; 6]>, Vec<f64>) = mech.actuated().zip(asked).map(of_leg).unzip();
+        let off = |row| match row {
+            Row::Constraint(c) => constraint::value(c, pose) * constraint::length(c, scale),
+            Row::Leg(_) | Row::Idle(_) => 0.0,
+        };
         let legs = DVector::from_vec(short) / scale;
-        let others =
-            DVector::from_iterator(mech.idle.len() + mech.independent.len(), idle.chain(off)) / scale;
-        let of_legs = DMatrix::from_fn(n, 6, |i, j| rows[i][j]);
+        let others = DVector::from_vec(rows::others(mech).map(off).collect()) / scale;
+        let of_legs = DMatrix::from_fn(n, 6, |i, j| of_legs[i][j]);
         // First what the others ask for, then what the legs ask for within that; each of least size.
         let rest = pure_rows(mech, pose, scale);
         let held = Svd::of(&DMatrix::from_fn(others.len(), 6, |i, j| rest[n + i][j]))?;

@@ -6,6 +6,7 @@
 use crate::kinematics::constraint;
 use crate::kinematics::idle;
 use crate::kinematics::leg;
+use crate::kinematics::rows::{self, Row};
 use crate::model::mechanism::{Drive, Leg, Mechanism};
 use crate::model::status::Status;
 use crate::number::real::{Ordered, Real};
@@ -102,28 +103,21 @@ pub struct System<T> {
 pub fn system<T: Real>(mech: &Mechanism, pose: &Pose<T>, asked: &[Asked<T>; 6]) -> System<T> {
     let scale = mech.characteristic_length;
     let mut system = System { residual: [T::zero(); 6], matrix: [[T::zero(); 6]; 6] };
-    let mut count = 0;
-    for (_, leg) in mech.actuated() {
-        let (e, r) = leg::vectors(leg, pose);
-        let r = asked[count].vector(leg, r);
-        let value = (r.dot(r) - asked[count].square).scale(0.5);
-        system.put(count, scale, value, Wrench::at(e, r), scale * scale);
-        count += 1;
-    }
-    for idle in &mech.idle {
-        // No step spins \[T71\].
-        system.put(count, scale, T::zero(), idle::row(idle, pose), 1.0);
-        count += 1;
-    }
-    for c in &mech.independent {
-        system.put(
-            count,
-            scale,
-            constraint::value(c, pose),
-            constraint::row(c, pose),
-            constraint::unit(c, scale),
-        );
-        count += 1;
+    for (k, row) in rows::of(mech).enumerate() {
+        let (value, row, unit) = match row {
+            Row::Leg(leg) => {
+                let (e, r) = leg::vectors(leg, pose);
+                let r = asked[k].vector(leg, r);
+                let value = (r.dot(r) - asked[k].square).scale(0.5);
+                (value, Wrench::at(e, r), scale * scale)
+            }
+            // No step spins \[T71\].
+            Row::Idle(idle) => (T::zero(), idle::row(idle, pose), 1.0),
+            Row::Constraint(c) => {
+                (constraint::value(c, pose), constraint::row(c, pose), constraint::unit(c, scale))
+            }
+        };
+        system.put(k, scale, value, row, unit);
     }
     system
 }

@@ -7,6 +7,7 @@
 
 use crate::forward_kinematics::homotopy::{C, Family, Place};
 use crate::forward_kinematics::newton::{Asked, System, system};
+use crate::kinematics::rows::{self, Row};
 use crate::model::mechanism::{Constraint, ConstraintKind, Mechanism};
 use crate::number::complex::Complex;
 use crate::number::lanes::Lanes;
@@ -34,11 +35,14 @@ impl<'a> Products<'a> {
     /// Random ones.
     #[must_use]
     pub fn new(mech: &'a Mechanism, asked: [Asked<C>; 6], draw: &mut Draw) -> Self {
-        let legs = mech.actuated().map(|_| 2);
-        // An idle spin needs no more than one pose of each orbit, which is a line of Study's coordinates.
-        let degrees = legs.chain(mech.idle.iter().map(|_| 1)).chain(mech.independent.iter().map(degree));
+        let degree = |row| match row {
+            Row::Leg(_) => 2,
+            // An idle spin needs no more than one pose of each orbit, which is a line of Study's coordinates.
+            Row::Idle(_) => 1,
+            Row::Constraint(c) => degree(c),
+        };
         let mut forms: [Vec<Form>; 6] = Default::default();
-        for (forms, degree) in forms.iter_mut().zip(degrees) {
+        for (forms, degree) in forms.iter_mut().zip(rows::of(mech).map(degree)) {
             forms.resize_with(degree, || std::array::from_fn(|_| draw.complex()));
         }
         Products { mech, asked, forms }

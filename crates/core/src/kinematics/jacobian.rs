@@ -1,10 +1,8 @@
 //! The completed Jacobian and Hessian: rows of the actuated legs over those of idle freedoms and of the independent
 //! constraints, and the solves with them. Of mechanisms with six rows; [`redundant`](crate::dynamics::redundant_actuation) has those with more.
 
-use crate::kinematics::constraint;
-use crate::kinematics::leg;
 use crate::kinematics::quadratic_forms::{Hessian, quadratic};
-use crate::kinematics::rows::{Matrix6, other_rows};
+use crate::kinematics::rows::{self, Matrix6};
 use crate::model::mechanism::Mechanism;
 use crate::number::real::{Constant, Real};
 use crate::numerics::gauss::solve;
@@ -13,16 +11,11 @@ use crate::spatial::{Acceleration, Pose, Twist};
 /// J of `J V = (ℓ', 0)`, its rows (δ, e×δ) and (c, τ) [Eq. 13].
 #[inline(always)]
 pub fn jacobian<T: Real>(mech: &Mechanism<impl Constant<T>>, pose: &Pose<T>) -> Matrix6<T> {
-    let mut rows = [[T::zero(); 6]; 6];
-    let mut count = 0;
-    for leg in &mech.legs {
-        if leg.actuated {
-            rows[count] = leg::row(leg, &leg::position(leg, pose)).array();
-            count += 1;
-        }
+    let mut matrix = [[T::zero(); 6]; 6];
+    for (k, row) in rows::of(mech).enumerate() {
+        matrix[k] = row.wrench(pose).array();
     }
-    other_rows(mech, pose, &mut rows[count..]);
-    rows
+    matrix
 }
 
 /// J with its torque columns divided by the characteristic length: pure numbers, so that a pivot ratio means the
@@ -57,18 +50,8 @@ fn unscaled<T: Real>(mech: &Mechanism<impl Constant<T>>, mut x: [T; 6]) -> [T; 6
 #[inline(always)]
 pub fn hessian<T: Real>(mech: &Mechanism<impl Constant<T>>, pose: &Pose<T>) -> [Hessian<T>; 6] {
     let mut layers = [[[T::zero(); 6]; 6]; 6];
-    let mut count = 0;
-    for leg in &mech.legs {
-        if leg.actuated {
-            layers[count] = leg::hessian(leg, &leg::position(leg, pose));
-            count += 1;
-        }
-    }
-    // The layers of idle freedoms are zero.
-    count += mech.idle.len();
-    for c in &mech.independent {
-        layers[count] = constraint::hessian(c, pose);
-        count += 1;
+    for (k, row) in rows::of(mech).enumerate() {
+        layers[k] = row.hessian(pose);
     }
     layers
 }

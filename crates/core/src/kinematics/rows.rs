@@ -1,51 +1,141 @@
 //! Rows of the Jacobian in their order: actuated legs, idle freedoms, independent constraints.
+//!
+//! The order is written here alone: [`of`] goes through the rows, [`RowNumbers`] tells where those of each sort are.
+
+use std::ops::Range;
 
 use crate::kinematics::constraint;
 use crate::kinematics::idle;
 use crate::kinematics::leg;
 use crate::kinematics::quadratic_forms::Hessian;
-use crate::model::mechanism::{Constraint, Idle, Mechanism};
+use crate::model::mechanism::{Constraint, Idle, Leg, Mechanism};
 use crate::number::real::{Constant, Real};
 use crate::spatial::motion::pure_row;
 use crate::spatial::{Pose, Wrench};
 
 pub type Matrix6<T> = [[T; 6]; 6];
 
-/// Rows of idle freedoms, then those of constraints.
+/// What a row of the Jacobian belongs to.
+#[derive(Clone, Copy, Debug)]
+pub enum Row<'a, S = f64> {
+    Leg(&'a Leg<S>),
+    Idle(&'a Idle<S>),
+    Constraint(&'a Constraint<S>),
+}
+
+/// All rows in order.
 #[inline(always)]
-pub(crate) fn other_rows<T: Real>(mech: &Mechanism<impl Constant<T>>, pose: &Pose<T>, rows: &mut [[T; 6]]) {
-    let idle = mech.idle.len();
-    for k in 0..idle {
-        rows[k] = idle::row(&mech.idle[k], pose).array();
+pub fn of<S>(mech: &Mechanism<S>) -> impl Iterator<Item = Row<'_, S>> {
+    mech.actuated().map(|(_, leg)| Row::Leg(leg)).chain(others(mech))
+}
+
+/// Those after the rows of the legs.
+#[inline(always)]
+pub fn others<S>(mech: &Mechanism<S>) -> impl Iterator<Item = Row<'_, S>> {
+    mech.idle.iter().map(Row::Idle).chain(mech.independent.iter().map(Row::Constraint))
+}
+
+/// Numbers of the rows of each sort.
+#[derive(Clone, Copy, Debug)]
+pub struct RowNumbers {
+    actuated: usize,
+    idle: usize,
+    constraints: usize,
+}
+
+impl RowNumbers {
+    #[inline(always)]
+    pub fn of<S>(mech: &Mechanism<S>) -> Self {
+        let actuated = mech.actuated().count();
+        RowNumbers { actuated, idle: mech.idle.len(), constraints: mech.independent.len() }
     }
-    for k in 0..mech.independent.len() {
-        rows[idle + k] = constraint::row(&mech.independent[k], pose).array();
+
+    /// Of actuated legs.
+    #[must_use]
+    #[inline(always)]
+    pub fn actuated(self) -> Range<usize> {
+        0..self.actuated
+    }
+
+    /// Of idle freedoms.
+    #[must_use]
+    #[inline(always)]
+    pub fn idle(self) -> Range<usize> {
+        self.actuated..self.actuated + self.idle
+    }
+
+    /// Of independent constraints.
+    #[must_use]
+    #[inline(always)]
+    pub fn constraints(self) -> Range<usize> {
+        let first = self.actuated + self.idle;
+        first..first + self.constraints
+    }
+
+    /// Of all but the legs.
+    #[must_use]
+    #[inline(always)]
+    pub fn others(self) -> Range<usize> {
+        self.actuated..self.actuated + self.idle + self.constraints
+    }
+}
+
+impl<S> Row<'_, S> {
+    /// The row itself [Eq. 13].
+    #[inline(always)]
+    pub fn wrench<T: Real>(self, pose: &Pose<T>) -> Wrench<T>
+    where
+        S: Constant<T>,
+    {
+        match self {
+            Row::Leg(leg) => leg::row(leg, &leg::position(leg, pose)),
+            Row::Idle(idle) => idle::row(idle, pose),
+            Row::Constraint(c) => constraint::row(c, pose),
+        }
+    }
+
+    /// Its layer of the Hessian [Eq. 19]; that of an idle freedom is zero.
+    #[inline(always)]
+    pub fn hessian<T: Real>(self, pose: &Pose<T>) -> Hessian<T>
+    where
+        S: Constant<T>,
+    {
+        match self {
+            Row::Leg(leg) => leg::hessian(leg, &leg::position(leg, pose)),
+            Row::Idle(_) => [[T::zero(); 6]; 6],
+            Row::Constraint(c) => constraint::hessian(c, pose),
+        }
+    }
+}
+
+impl Row<'_> {
+    /// The row in pure numbers for the length `scale` \[T30\].
+    #[inline(always)]
+    pub(crate) fn pure<T: Real>(self, pose: &Pose<T>, scale: f64) -> [T; 6] {
+        match self {
+            Row::Leg(leg) => pure_row(leg::row(leg, &leg::position(leg, pose)), scale),
+            Row::Idle(idle) => idle_row(idle, pose, scale),
+            Row::Constraint(c) => constraint_row(c, pose, scale),
+        }
     }
 }
 
 /// J, row by row [Eq. 13].
 #[must_use]
 pub fn all_rows(mech: &Mechanism, pose: &Pose<f64>) -> Vec<[f64; 6]> {
-    let legs = mech.actuated().map(|(_, leg)| leg::row(leg, &leg::position(leg, pose)));
-    let idle = mech.idle.iter().map(|idle| idle::row(idle, pose));
-    let constraints = mech.independent.iter().map(|c| constraint::row(c, pose));
-    legs.chain(idle).chain(constraints).map(Wrench::array).collect()
+    of(mech).map(|row| row.wrench(pose).array()).collect()
 }
 
 /// H, layer by layer [Eq. 19].
 #[must_use]
 pub fn all_hessians(mech: &Mechanism, pose: &Pose<f64>) -> Vec<Hessian<f64>> {
-    let legs = mech.actuated().map(|(_, leg)| leg::hessian(leg, &leg::position(leg, pose)));
-    let idle = mech.idle.iter().map(|_| [[0.0; 6]; 6]);
-    legs.chain(idle).chain(mech.independent.iter().map(|c| constraint::hessian(c, pose))).collect()
+    of(mech).map(|row| row.hessian(pose)).collect()
 }
 
 /// J in pure numbers \[T30\].
 #[must_use]
 pub fn pure_rows(mech: &Mechanism, pose: &Pose<f64>, scale: f64) -> Vec<[f64; 6]> {
-    let legs = mech.actuated().map(|(_, leg)| pure_row(leg::row(leg, &leg::position(leg, pose)), scale));
-    let idle = mech.idle.iter().map(|idle| idle_row(idle, pose, scale));
-    legs.chain(idle).chain(mech.independent.iter().map(|c| constraint_row(c, pose, scale))).collect()
+    of(mech).map(|row| row.pure(pose, scale)).collect()
 }
 
 /// A constraint's row for the twist (v, Λω), of a constraint counted as a length, in pure numbers: `(c, τ/Λ)`, and
@@ -58,27 +148,16 @@ pub(crate) fn constraint_row<T: Real>(c: &Constraint, pose: &Pose<T>, scale: f64
 /// J in pure numbers for the length `scale`: its determinant says on which side of the singular poses a pose is \[T30\].
 #[inline(always)]
 pub fn pure_jacobian<T: Real>(mech: &Mechanism, pose: &Pose<T>, scale: f64) -> Matrix6<T> {
-    let (mut rows, mut count) = ([[T::zero(); 6]; 6], 0);
-    for leg in &mech.legs {
-        if leg.actuated {
-            rows[count] = pure_row(leg::row(leg, &leg::position(leg, pose)), scale);
-            count += 1;
-        }
-    }
-    for idle in &mech.idle {
-        rows[count] = idle_row(idle, pose, scale);
-        count += 1;
-    }
-    for c in &mech.independent {
-        rows[count] = constraint_row(c, pose, scale);
-        count += 1;
+    let mut rows = [[T::zero(); 6]; 6];
+    for (k, row) in of(mech).enumerate() {
+        rows[k] = row.pure(pose, scale);
     }
     rows
 }
 
 /// An idle freedom's row, counted as a constraint on a turn is: `(0, u)`.
 #[inline(always)]
-pub(crate) fn idle_row<T: Real>(idle: &Idle, pose: &Pose<T>, scale: f64) -> [T; 6] {
+fn idle_row<T: Real>(idle: &Idle, pose: &Pose<T>, scale: f64) -> [T; 6] {
     pure_row(idle::row(idle, pose) * T::lit(scale), scale)
 }
 
@@ -86,16 +165,8 @@ pub(crate) fn idle_row<T: Real>(idle: &Idle, pose: &Pose<T>, scale: f64) -> [T; 
 #[inline(always)]
 pub(crate) fn gram<T: Real>(mech: &Mechanism, pose: &Pose<T>, scale: f64) -> Matrix6<T> {
     let mut sum = [[T::zero(); 6]; 6];
-    for leg in &mech.legs {
-        if leg.actuated {
-            add_square(&mut sum, &pure_row(leg::row(leg, &leg::position(leg, pose)), scale));
-        }
-    }
-    for idle in &mech.idle {
-        add_square(&mut sum, &idle_row(idle, pose, scale));
-    }
-    for c in &mech.independent {
-        add_square(&mut sum, &constraint_row(c, pose, scale));
+    for row in of(mech) {
+        add_square(&mut sum, &row.pure(pose, scale));
     }
     sum
 }
