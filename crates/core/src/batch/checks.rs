@@ -267,17 +267,15 @@ pub(super) fn solved<V: Lanes>(mech: &Mechanism, solution: &[V], pivots: V, code
     codes.unless(pivots.greater(V::lit(least)), Status::Singular).unless(finite(solution), Status::Singular)
 }
 
-/// One number of each actuated leg, of as many as there are legs; zero beyond.
+/// One number of each actuated leg, of as many as there are legs.
 #[inline(always)]
-pub(super) fn actuated<V: Lanes>(mech: &Mechanism, values: &[f64], at: At) -> [V; 6] {
-    let (mut found, mut count) = ([V::zero(); 6], 0);
+pub(super) fn read_actuated<V: Lanes>(mech: &Mechanism, values: &[f64], at: At, read: &mut Vec<V>) {
+    read.clear();
     for k in 0..mech.legs.len() {
         if mech.legs[k].actuated {
-            found[count] = at.read_one(values, mech.legs.len(), k);
-            count += 1;
+            read.push(at.read_one(values, mech.legs.len(), k));
         }
     }
-    found
 }
 
 pub(super) fn actuated_values(mech: &Mechanism, values: &[f64], i: usize) -> Vec<f64> {

@@ -2,10 +2,11 @@
 
 use super::block::{self, Answers, At, Codes, Working};
 use super::checks::{solved, within_limits};
-use super::{FieldId, Loads, States, Table, redundant};
+use super::{FieldId, Loads, States, Table};
 use crate::assembly::geometric_parameters;
-use crate::dynamics::derivatives::{self, Column, Coordinates, DIRECTIONS, Solved, Varied};
-use crate::dynamics::inverse_dynamics::{Answering, resultant};
+use crate::dynamics::derivatives::{self, Coordinates, DIRECTIONS, Solved, Varied};
+use crate::dynamics::force_balance::UnitForceResponse;
+use crate::dynamics::inverse_dynamics::resultant;
 use crate::dynamics::regressor::{self, Regressor};
 use crate::kinematics::coordinate_sets::{DEPENDENT_PIVOTS, MAX_COORDINATES, Set};
 use crate::kinematics::leg;
@@ -53,9 +54,6 @@ pub fn inverse_dynamics_derivatives(
         ("constraint_by_geometry", vec![multipliers, geometry.len()]),
         ("lengths_by_geometry", vec![forces, geometry.len()]),
     ];
-    if mech.is_redundant() {
-        return redundant::inverse_dynamics_derivatives(mech, states, loads, set, given, fields);
-    }
     let varied = geometry.iter().map(|parameter| Varied::new(mech, parameter, set));
     let operation = Derivatives {
         mech,
@@ -87,33 +85,52 @@ struct Derivatives<'a> {
     regressor: Regressor,
 }
 
-/// Columns of a block of states, and the legs' states and lengths.
+/// Forces and their response at a block of states, columns of derivatives, and the legs' states and lengths.
 struct Room<V> {
+    response: UnitForceResponse<V>,
+    forces: Vec<V>,
     legs: Vec<leg::State<V>>,
-    columns: Vec<Column<V>>,
+    by_motion: Vec<V>,
+    by_bodies: Vec<V>,
+    column: Vec<V>,
+    /// Numbers of the rows of J where actuators are redundant, else none.
+    off: Vec<V>,
     lengths: Vec<V>,
+}
+
+impl<V: Lanes> Room<V> {
+    fn new(mech: &Mechanism, parameters: usize) -> Self {
+        let (rows, zeros) = (mech.rows(), |count: usize| vec![V::zero(); count]);
+        Room {
+            response: UnitForceResponse::new(mech),
+            forces: zeros(rows),
+            legs: Vec::with_capacity(mech.legs.len()),
+            by_motion: zeros(DIRECTIONS * rows),
+            by_bodies: zeros(parameters * rows),
+            column: zeros(rows),
+            off: zeros(if mech.is_redundant() { rows } else { 0 }),
+            lengths: zeros(mech.legs.len()),
+        }
+    }
 }
 
 impl Working<17> for Derivatives<'_> {
     type Room<V: Lanes> = Room<V>;
 
     fn room<V: Lanes>(&self) -> Room<V> {
-        Room {
-            legs: Vec::with_capacity(self.mech.legs.len()),
-            columns: vec![[V::zero(); 6]; self.regressor.parameters.len()],
-            lengths: vec![V::zero(); self.mech.legs.len()],
-        }
+        Room::new(self.mech, self.regressor.parameters.len())
     }
 
     #[inline(always)]
     fn run<V: Lanes>(&self, room: &mut Room<V>, at: At, answers: &mut Answers<'_, 17>) -> Codes<V> {
         let (mech, ids) = (self.mech, Answers::<17>::fields());
-        let (state, codes) = solve(mech, self.states, self.loads, at);
-        let by_motion = derivatives::by_motion(mech, &state);
-        for k in 0..DIRECTIONS {
-            put(mech, answers, pair(&ids, k / 6), 6, k % 6, &by_motion[k]);
+        let Room { response, forces, legs, by_motion, by_bodies, column, off, lengths } = room;
+        let (state, codes) = solve(mech, self.states, self.loads, at, response, forces);
+        derivatives::by_motion(mech, &state, off, by_motion);
+        for (k, column) in by_motion.chunks_exact(state.forces.len()).enumerate() {
+            put(mech, answers, pair(&ids, k / 6), 6, k % 6, column);
         }
-        self.put_by_bodies(room, &state, pair(&ids, 6), answers);
+        self.put_by_bodies(&state, legs, by_bodies, column, pair(&ids, 6), answers);
 
         let by = Coordinates::at(mech, self.set, &self.still, self.given, &state.platform);
         let determined = by.following.pivots.greater(V::lit(DEPENDENT_PIVOTS));
@@ -121,25 +138,25 @@ impl Working<17> for Derivatives<'_> {
         for (k, &number) in self.numbers.iter().enumerate() {
             let varied = by.varied(&self.still, number);
             for order in 0..3 {
-                let column = by.derivative(&by_motion, &varied, order);
-                sum = add(sum, &column);
-                put(mech, answers, pair(&ids, 3 + order), self.numbers.len(), k, &column);
+                by.put_derivative(by_motion, &varied, order, column);
+                sum = add(sum, column);
+                put(mech, answers, pair(&ids, 3 + order), self.numbers.len(), k, column);
             }
         }
         let codes = keep(answers, &ids[6..12], determined, sum, codes);
 
         let mut sum = V::zero();
         for k in 0..self.parameters {
-            let column = match &self.varied {
+            match &self.varied {
                 Some(varied) => {
-                    derivatives::by_geometry(&varied[k], &state, &by_motion, &by, &mut room.lengths)
+                    derivatives::by_geometry(&varied[k], &state, &by, by_motion, off, column, lengths);
                 }
-                None => [V::lit(f64::NAN); 6],
-            };
-            sum = add(add(sum, &column), &room.lengths);
-            put(mech, answers, pair(&ids, 7), self.parameters, k, &column);
+                None => column.fill(V::lit(f64::NAN)),
+            }
+            sum = add(add(sum, column), lengths);
+            put(mech, answers, pair(&ids, 7), self.parameters, k, column);
             for leg in 0..mech.legs.len() {
-                answers.put(ids[16], leg * self.parameters + k, [room.lengths[leg]]);
+                answers.put(ids[16], leg * self.parameters + k, [lengths[leg]]);
             }
         }
         let codes = keep(answers, &ids[14..17], determined, sum, codes);
@@ -167,18 +184,21 @@ impl Derivatives<'_> {
     #[inline(always)]
     fn put_by_bodies<V: Lanes>(
         &self,
-        room: &mut Room<V>,
         state: &Solved<V>,
+        legs: &mut Vec<leg::State<V>>,
+        columns: &mut [V],
+        column: &mut [V],
         fields: Pair,
         answers: &mut Answers<'_, 17>,
     ) {
-        let (mech, count) = (self.mech, room.columns.len());
-        set_legs(mech, state, &mut room.legs);
-        for k in 0..count {
-            room.columns[k] = self.regressor.column(mech, &state.platform, &room.legs, &state.answering, k);
+        let (mech, count) = (self.mech, self.regressor.parameters.len());
+        set_legs(mech, state, legs);
+        for (k, unit) in columns.chunks_exact_mut(column.len()).enumerate() {
+            state.response.put(self.regressor.wrench(mech, &state.platform, legs, k), &[], unit);
         }
         for k in 0..count {
-            put(mech, answers, fields, count, k, &self.regressor.by_bodies(&room.columns, k));
+            self.regressor.put_by_bodies(columns, k, column);
+            put(mech, answers, fields, count, k, column);
         }
     }
 }
@@ -208,9 +228,6 @@ pub fn regressors(mech: &Mechanism, states: &States, loads: &Loads) -> Table {
         ("forces_offset", vec![forces]),
         ("constraint_offset", vec![multipliers]),
     ];
-    if mech.is_redundant() {
-        return redundant::regressors(mech, states, loads, fields);
-    }
     let operation = Regressors { mech, states, loads, regressor: Regressor::new(mech) };
     block::table(&operation, states.len(), fields)
 }
@@ -223,38 +240,46 @@ struct Regressors<'a> {
 }
 
 impl Working<4> for Regressors<'_> {
-    type Room<V: Lanes> = Vec<leg::State<V>>;
+    type Room<V: Lanes> = Room<V>;
 
-    fn room<V: Lanes>(&self) -> Vec<leg::State<V>> {
-        Vec::with_capacity(self.mech.legs.len())
+    fn room<V: Lanes>(&self) -> Room<V> {
+        Room::new(self.mech, 0)
     }
 
     #[inline(always)]
-    fn run<V: Lanes>(&self, legs: &mut Vec<leg::State<V>>, at: At, answers: &mut Answers<'_, 4>) -> Codes<V> {
+    fn run<V: Lanes>(&self, room: &mut Room<V>, at: At, answers: &mut Answers<'_, 4>) -> Codes<V> {
         let (mech, [y, y_constraint, offset, offset_constraint]) = (self.mech, Answers::fields());
-        let (state, codes) = solve(mech, self.states, self.loads, at);
+        let Room { response, forces, legs, column, .. } = room;
+        let (state, codes) = solve(mech, self.states, self.loads, at, response, forces);
         set_legs(mech, &state, legs);
-        let (platform, answering) = (&state.platform, &state.answering);
-        let width = self.regressor.parameters.len();
+        let (platform, width) = (&state.platform, self.regressor.parameters.len());
         for k in 0..width {
-            let column = self.regressor.column(mech, platform, legs, answering, k);
-            put(mech, answers, [y, y_constraint], width, k, &column);
+            state.response.put(self.regressor.wrench(mech, platform, legs, k), &[], column);
+            put(mech, answers, [y, y_constraint], width, k, column);
         }
         let load = self.loads.of(mech, &platform.pose, at);
-        let rest = Regressor::offset(mech, &platform.twist, load, answering);
-        put(mech, answers, [offset, offset_constraint], 1, 0, &rest);
+        state.response.put(Regressor::rest(mech, &platform.twist, load), &[], column);
+        put(mech, answers, [offset, offset_constraint], 1, 0, column);
         within_limits(mech, &platform.pose, codes)
     }
 }
 
 /// Inverse dynamics at the states, and whether it has an answer there.
 #[inline(always)]
-fn solve<V: Lanes>(mech: &Mechanism, states: &States, loads: &Loads, at: At) -> (Solved<V>, Codes<V>) {
+fn solve<'a, V: Lanes>(
+    mech: &Mechanism,
+    states: &States,
+    loads: &Loads,
+    at: At,
+    response: &'a mut UnitForceResponse<V>,
+    forces: &'a mut [V],
+) -> (Solved<'a, V>, Codes<V>) {
     let (platform, load, codes) = states.loaded_at(mech, loads, at);
-    let answering = Answering::at(mech, &platform.pose);
-    let forces = answering.to(resultant(mech, &platform, load));
-    let codes = solved(mech, &forces, answering.pivots, codes);
-    (Solved { platform, load: loads.given(mech, at), forces, answering }, codes)
+    response.set(mech, &platform.pose);
+    let motion = response.balance(resultant(mech, &platform, load), forces);
+    let codes = solved(mech, forces, response.regular, codes);
+    let (load, numbers) = (loads.given(mech, at), RowNumbers::of(mech));
+    (Solved { platform, load, numbers, forces, motion, response }, codes)
 }
 
 #[inline(always)]
@@ -273,14 +298,15 @@ fn put<V: Lanes, const N: usize>(
     [forces, multipliers]: Pair,
     width: usize,
     k: usize,
-    column: &Column<V>,
+    column: &[V],
 ) {
+    let numbers = RowNumbers::of(mech);
     let mut row = 0;
     for (i, leg) in mech.legs.iter().enumerate() {
         answers.put(forces, i * width + k, [if leg.actuated { column[row] } else { V::zero() }]);
         row += usize::from(leg.actuated);
     }
-    for (i, row) in RowNumbers::of(mech).constraints().enumerate() {
-        answers.put(multipliers, i * width + k, [column[row]]);
+    for (i, x) in column[numbers.constraints()].iter().enumerate() {
+        answers.put(multipliers, i * width + k, [*x]);
     }
 }

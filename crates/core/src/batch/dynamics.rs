@@ -1,11 +1,14 @@
 //! Dynamics of many states.
 
-use super::block::{self, Answers, At, Codes, Operation};
-use super::checks::{finite, pose_at, solved, with_leg, with_motion, within_limits, within_limits_of};
-use super::{FieldId, States, Table, redundant};
+use super::block::{self, Answers, At, Codes, Operation, Working};
+use super::checks::{
+    finite, pose_at, read_actuated, solved, with_leg, with_motion, within_limits, within_limits_of,
+};
+use super::{FieldId, States, Table};
+use crate::dynamics::force_balance::ForceSolver;
 use crate::dynamics::inverse_dynamics::{self, Balance};
 use crate::kinematics::leg;
-use crate::kinematics::rows::{self, RowNumbers};
+use crate::kinematics::rows;
 use crate::limits::margins::Seen;
 use crate::mobility::degrees_of_freedom;
 use crate::model::mechanism::Mechanism;
@@ -51,26 +54,31 @@ pub fn inverse_dynamics(
     loads: &Loads,
     preferred: Option<&[f64]>,
 ) -> Table {
-    if mech.is_redundant() {
-        return redundant::inverse_dynamics(mech, states, loads, preferred);
-    }
     let fields = [
         ("forces", vec![mech.legs.len()]),
         ("constraint", vec![mech.independent.len()]),
         ("idle_torques", vec![mech.idle.len()]),
     ];
-    block::table(&InverseDynamics { mech, states, loads }, states.len(), fields)
+    let preferred = preferred.filter(|_| mech.is_redundant());
+    block::table(&InverseDynamics { mech, states, loads, preferred }, states.len(), fields)
 }
 
 struct InverseDynamics<'a> {
     mech: &'a Mechanism,
     states: &'a States<'a>,
     loads: &'a Loads<'a>,
+    preferred: Option<&'a [f64]>,
 }
 
-impl Operation<3> for InverseDynamics<'_> {
+impl Working<3> for InverseDynamics<'_> {
+    type Room<V: Lanes> = ForceSolver<V>;
+
+    fn room<V: Lanes>(&self) -> ForceSolver<V> {
+        ForceSolver::new(self.mech)
+    }
+
     #[inline(always)]
-    fn run<V: Lanes>(&self, at: At, answers: &mut Answers<'_, 3>) -> Codes<V> {
+    fn run<V: Lanes>(&self, room: &mut ForceSolver<V>, at: At, answers: &mut Answers<'_, 3>) -> Codes<V> {
         let (mech, [forces, multipliers, torques]) = (self.mech, Answers::fields());
         let (platform, codes) = self.states.platform(at);
         let (pose, load) = (&platform.pose, self.loads.of(mech, &platform.pose, at));
@@ -83,29 +91,33 @@ impl Operation<3> for InverseDynamics<'_> {
             seen.next(p);
             balance.add(mech, k, leg, &place, &platform);
         }
-        let (f, pivots) = balance.solved(mech, pose);
-        let codes = codes
+        let mut codes = codes
             .then(with_motion(mech, &platform, legs))
             .unless(finite(&load.array()), Status::InvalidInput);
-        put_forces(mech, answers, forces, &f);
-        let rows = RowNumbers::of(mech);
-        for (k, row) in rows.constraints().enumerate() {
-            answers.put(multipliers, k, [f[row]]);
+        if let Some(preferred) = self.preferred {
+            read_actuated(mech, preferred, at, &mut room.preferred);
+            codes = codes.unless(finite(&room.preferred), Status::InvalidInput);
         }
-        for (k, row) in rows.idle().enumerate() {
-            answers.put(torques, k, [f[row]]);
+        let regular = room.solve(mech, pose, balance);
+        let (f, numbers) = (&room.forces, room.numbers);
+        put_of_legs(mech, answers, forces, &f[numbers.actuated()]);
+        for (k, multiplier) in f[numbers.constraints()].iter().enumerate() {
+            answers.put(multipliers, k, [*multiplier]);
         }
-        within_limits_of(mech, pose, &mut seen, solved(mech, &f, pivots, codes))
+        for (k, torque) in f[numbers.idle()].iter().enumerate() {
+            answers.put(torques, k, [*torque]);
+        }
+        within_limits_of(mech, pose, &mut seen, solved(mech, f, regular, codes))
     }
 }
 
 /// Active forces of all legs, zero for passive ones.
 #[inline(always)]
-fn put_forces<V: Lanes, const N: usize>(
+fn put_of_legs<V: Lanes, const N: usize>(
     mech: &Mechanism,
     answers: &mut Answers<'_, N>,
     field: FieldId,
-    forces: &[V; 6],
+    forces: &[V],
 ) {
     let mut row = 0;
     for (k, leg) in mech.legs.iter().enumerate() {
@@ -178,9 +190,6 @@ pub fn power(mech: &Mechanism, states: &States, loads: &Loads) -> Table {
         "friction",
         "residual",
     ];
-    if mech.is_redundant() {
-        return redundant::power(mech, states, loads, names, |platform| energy_along(mech, platform));
-    }
     block::table(&Power { mech, states, loads }, states.len(), names.map(|name| (name, vec![])))
 }
 
@@ -190,19 +199,26 @@ struct Power<'a> {
     loads: &'a Loads<'a>,
 }
 
-impl Operation<9> for Power<'_> {
+impl Working<9> for Power<'_> {
+    type Room<V: Lanes> = ForceSolver<V>;
+
+    fn room<V: Lanes>(&self) -> ForceSolver<V> {
+        ForceSolver::new(self.mech)
+    }
+
     #[inline(always)]
-    fn run<V: Lanes>(&self, at: At, answers: &mut Answers<'_, 9>) -> Codes<V> {
+    fn run<V: Lanes>(&self, room: &mut ForceSolver<V>, at: At, answers: &mut Answers<'_, 9>) -> Codes<V> {
         let (mech, ids) = (self.mech, Answers::<9>::fields());
         let (platform, wrench, codes) = self.states.loaded_at::<V>(mech, self.loads, at);
         let Motion { pose, twist, .. } = &platform;
         let (kinetic, potential) = energy_along(mech, &platform);
         let load = wrench.power(twist);
         let damping = inverse_dynamics::damping_wrench(mech, twist).power(twist);
-        let (f, pivots) = inverse_dynamics::inverse_dynamics(mech, &platform, wrench);
-        let regular = solved(mech, &f, pivots, Codes::ok()).are(Status::Ok);
+        let regular = room.solve_motion(mech, &platform, wrench);
+        let f = &room.forces;
+        let regular = solved(mech, f, regular, Codes::ok()).are(Status::Ok);
         let mut actuators = V::zero();
-        for (k, row) in rows::of(mech).take(RowNumbers::of(mech).idle().end).enumerate() {
+        for (k, row) in rows::of(mech).take(room.numbers.idle().end).enumerate() {
             actuators = actuators + row.wrench(pose).power(twist) * f[k];
         }
         actuators = V::select(regular, actuators, V::lit(f64::NAN));

@@ -1,9 +1,11 @@
 //! Forward dynamics of many states.
 
-use super::block::{self, Answers, At, Codes, Operation, Pieces, Rows};
-use super::checks::{SINGULAR_PIVOTS, actuated, finite, limit_status, pose_at, with_twist, within_limits};
+use super::block::{self, Answers, At, Codes, Pieces, Rows, Working};
+use super::checks::{
+    SINGULAR_PIVOTS, finite, limit_status, pose_at, read_actuated, with_twist, within_limits,
+};
 use super::dynamics::Loads;
-use super::{FieldId, Table, redundant};
+use super::{FieldId, Table};
 use crate::dynamics::forward_dynamics::{self, Equations};
 use crate::kinematics::coordinate_sets::Set;
 use crate::kinematics::leg;
@@ -31,9 +33,6 @@ pub fn forward_dynamics(
     loads: &Loads,
 ) -> Table {
     let fields = [("acceleration", vec![6]), ("constraint", vec![mech.independent.len()])];
-    if mech.is_redundant() {
-        return redundant::forward_dynamics(mech, poses, twists, forces, loads, fields);
-    }
     let operation = ForwardDynamics { mech, poses, twists, forces, loads };
     block::table(&operation, poses.len() / 16, fields)
 }
@@ -46,17 +45,25 @@ struct ForwardDynamics<'a> {
     loads: &'a Loads<'a>,
 }
 
-impl Operation<2> for ForwardDynamics<'_> {
+impl Working<2> for ForwardDynamics<'_> {
+    /// Forces of the actuated legs.
+    type Room<V: Lanes> = Vec<V>;
+
+    fn room<V: Lanes>(&self) -> Vec<V> {
+        Vec::with_capacity(self.mech.legs.len())
+    }
+
     #[inline(always)]
-    fn run<V: Lanes>(&self, at: At, answers: &mut Answers<'_, 2>) -> Codes<V> {
+    fn run<V: Lanes>(&self, push: &mut Vec<V>, at: At, answers: &mut Answers<'_, 2>) -> Codes<V> {
         let (mech, [acceleration, multipliers]) = (self.mech, Answers::fields());
         let (pose, codes) = pose_at(mech, self.poses, at);
         let twist = Twist::from_array(at.read(self.twists));
-        let (load, push) = (self.loads.of(mech, &pose, at), actuated(mech, self.forces, at));
+        let load = self.loads.of(mech, &pose, at);
+        read_actuated(mech, self.forces, at, push);
         let codes = with_twist(mech, &pose, &twist, codes)
             .unless(finite(&load.array()), Status::InvalidInput)
-            .unless(finite(&push), Status::InvalidInput);
-        let driven = forward_dynamics::forward_dynamics::<V>(mech, &pose, &twist, &push, load);
+            .unless(finite(push), Status::InvalidInput);
+        let driven = forward_dynamics::forward_dynamics::<V>(mech, &pose, &twist, push, load);
         let a = driven.acceleration.array();
         answers.put(acceleration, 0, a);
         for k in 0..mech.independent.len() {

@@ -1,13 +1,15 @@
 //! Kinematics of many states.
 
-use super::block::{self, Answers, At, Codes, Operation};
+use super::block::{self, Answers, At, Codes, Operation, Working};
 use super::checks::{
-    actuated, any_pose, finite, kept, pose_at, solved, with_leg, with_motion, with_twist, within_limits_of,
+    any_pose, finite, kept, pose_at, read_actuated, solved, with_leg, with_motion, with_twist,
+    within_limits_of,
 };
-use super::{States, Table, redundant};
-use crate::kinematics::jacobian;
+use super::{States, Table};
+use crate::kinematics::jacobian::MotionSolver;
 use crate::kinematics::leg;
 use crate::kinematics::passive_joints;
+use crate::kinematics::rows;
 use crate::limits::margins::Seen;
 use crate::model::limit::Zero;
 use crate::model::mechanism::Mechanism;
@@ -50,10 +52,7 @@ impl Operation<3> for InverseKinematics<'_> {
 /// J for each pose, constraint satisfied or not [Eq. 13].
 #[must_use]
 pub fn jacobians(mech: &Mechanism, poses: &[f64]) -> Table {
-    if mech.is_redundant() {
-        return redundant::jacobians(mech, poses);
-    }
-    block::table(&Jacobians { mech, poses }, poses.len() / 16, [("jacobian", vec![6, 6])])
+    block::table(&Jacobians { mech, poses }, poses.len() / 16, [("jacobian", vec![mech.rows(), 6])])
 }
 
 struct Jacobians<'a> {
@@ -66,9 +65,8 @@ impl Operation<1> for Jacobians<'_> {
     fn run<V: Lanes>(&self, at: At, answers: &mut Answers<'_, 1>) -> Codes<V> {
         let (pose, codes) = any_pose(self.poses, at);
         let [matrix] = Answers::fields();
-        let rows = jacobian::jacobian(self.mech, &pose);
-        for k in 0..6 {
-            answers.put(matrix, k, rows[k]);
+        for (k, row) in rows::of(self.mech).enumerate() {
+            answers.put(matrix, k, row.wrench(&pose).array());
         }
         codes
     }
@@ -77,10 +75,7 @@ impl Operation<1> for Jacobians<'_> {
 /// H for each pose, constraint satisfied or not [Eq. 19].
 #[must_use]
 pub fn hessians(mech: &Mechanism, poses: &[f64]) -> Table {
-    if mech.is_redundant() {
-        return redundant::hessians(mech, poses);
-    }
-    block::table(&Hessians { mech, poses }, poses.len() / 16, [("hessian", vec![6, 6, 6])])
+    block::table(&Hessians { mech, poses }, poses.len() / 16, [("hessian", vec![mech.rows(), 6, 6])])
 }
 
 struct Hessians<'a> {
@@ -93,10 +88,10 @@ impl Operation<1> for Hessians<'_> {
     fn run<V: Lanes>(&self, at: At, answers: &mut Answers<'_, 1>) -> Codes<V> {
         let (pose, codes) = any_pose(self.poses, at);
         let [layers] = Answers::fields();
-        let found = jacobian::hessian(self.mech, &pose);
-        for k in 0..6 {
+        for (k, row) in rows::of(self.mech).enumerate() {
+            let layer = row.hessian(&pose);
             for i in 0..6 {
-                answers.put(layers, 6 * k + i, found[k][i]);
+                answers.put(layers, 6 * k + i, layer[i]);
             }
         }
         codes
@@ -207,12 +202,10 @@ impl Operation<21> for Kinematics<'_> {
     }
 }
 
-/// The platform's twist from the rates of all legs; those of passive legs are not read [Eq. 13].
+/// The platform's twist from the rates of all legs; those of passive legs are not read [Eq. 13]. Where actuators are redundant
+/// the legs must agree \[T73\].
 #[must_use]
 pub fn platform_twist(mech: &Mechanism, poses: &[f64], rates: &[f64]) -> Table {
-    if mech.is_redundant() {
-        return redundant::platform_twist(mech, poses, rates);
-    }
     block::table(&PlatformTwist { mech, poses, rates }, poses.len() / 16, [("twist", vec![6])])
 }
 
@@ -222,15 +215,22 @@ struct PlatformTwist<'a> {
     rates: &'a [f64],
 }
 
-impl Operation<1> for PlatformTwist<'_> {
+impl Working<1> for PlatformTwist<'_> {
+    type Room<V: Lanes> = MotionSolver<V>;
+
+    fn room<V: Lanes>(&self) -> MotionSolver<V> {
+        MotionSolver::new(self.mech)
+    }
+
     #[inline(always)]
-    fn run<V: Lanes>(&self, at: At, answers: &mut Answers<'_, 1>) -> Codes<V> {
+    fn run<V: Lanes>(&self, room: &mut MotionSolver<V>, at: At, answers: &mut Answers<'_, 1>) -> Codes<V> {
         let (mech, [field]) = (self.mech, Answers::fields());
         let (pose, codes) = pose_at(mech, self.poses, at);
-        let legs = actuated(mech, self.rates, at);
-        let (twist, pivots) = jacobian::platform_twist(mech, &pose, &legs);
-        answers.put(field, 0, twist.array());
-        solved(mech, &twist.array(), pivots, codes.unless(finite(&legs), Status::InvalidInput))
+        read_actuated(mech, self.rates, at, &mut room.driven);
+        let codes = codes.unless(finite(&room.driven), Status::InvalidInput);
+        let found = room.twist(mech, &pose);
+        answers.put(field, 0, found.motion.array());
+        solved(mech, &found.motion.array(), found.regular, codes).unless(found.agrees, Status::Inconsistent)
     }
 }
 
@@ -242,9 +242,6 @@ pub fn platform_acceleration(
     twists: &[f64],
     accelerations: &[f64],
 ) -> Table {
-    if mech.is_redundant() {
-        return redundant::platform_acceleration(mech, poses, twists, accelerations);
-    }
     let operation = PlatformAcceleration { mech, poses, twists, accelerations };
     block::table(&operation, poses.len() / 16, [("acceleration", vec![6])])
 }
@@ -256,16 +253,22 @@ struct PlatformAcceleration<'a> {
     accelerations: &'a [f64],
 }
 
-impl Operation<1> for PlatformAcceleration<'_> {
+impl Working<1> for PlatformAcceleration<'_> {
+    type Room<V: Lanes> = MotionSolver<V>;
+
+    fn room<V: Lanes>(&self) -> MotionSolver<V> {
+        MotionSolver::new(self.mech)
+    }
+
     #[inline(always)]
-    fn run<V: Lanes>(&self, at: At, answers: &mut Answers<'_, 1>) -> Codes<V> {
+    fn run<V: Lanes>(&self, room: &mut MotionSolver<V>, at: At, answers: &mut Answers<'_, 1>) -> Codes<V> {
         let (mech, [field]) = (self.mech, Answers::fields());
         let (pose, codes) = pose_at(mech, self.poses, at);
         let twist = Twist::from_array(at.read(self.twists));
-        let legs = actuated(mech, self.accelerations, at);
-        let codes = with_twist(mech, &pose, &twist, codes).unless(finite(&legs), Status::InvalidInput);
-        let (a, pivots) = jacobian::platform_acceleration(mech, &pose, &twist, &legs);
-        answers.put(field, 0, a.array());
-        solved(mech, &a.array(), pivots, codes)
+        read_actuated(mech, self.accelerations, at, &mut room.driven);
+        let codes = with_twist(mech, &pose, &twist, codes).unless(finite(&room.driven), Status::InvalidInput);
+        let found = room.acceleration(mech, &pose, &twist);
+        answers.put(field, 0, found.motion.array());
+        solved(mech, &found.motion.array(), found.regular, codes).unless(found.agrees, Status::Inconsistent)
     }
 }

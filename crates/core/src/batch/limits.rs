@@ -1,10 +1,10 @@
 //! Limits of many states.
 
-use super::block::{self, Answers, At, Codes, Operation};
+use super::block::{self, Answers, At, Codes, Working};
 use super::checks::solved;
 use super::dynamics::Loads;
-use super::{States, Table, redundant};
-use crate::dynamics::inverse_dynamics;
+use super::{States, Table};
+use crate::dynamics::force_balance::ForceSolver;
 use crate::limits::margins::{Binding, Seen};
 use crate::model::limit::Measure;
 use crate::model::mechanism::Mechanism;
@@ -19,9 +19,6 @@ pub fn limits(mech: &Mechanism, states: &States, loads: &Loads) -> Table {
     let count = mech.limits.len();
     let fields =
         [("margins", vec![count]), ("relative", vec![count]), ("binding", vec![]), ("within", vec![])];
-    if mech.is_redundant() {
-        return redundant::limits(mech, states, loads, fields);
-    }
     let forces = mech.limits.iter().any(|limit| matches!(limit.measure, Measure::Force { .. }));
     block::table(&Limits { mech, states, loads, forces }, states.len(), fields)
 }
@@ -34,23 +31,28 @@ struct Limits<'a> {
     forces: bool,
 }
 
-impl Operation<4> for Limits<'_> {
+impl Working<4> for Limits<'_> {
+    type Room<V: Lanes> = ForceSolver<V>;
+
+    fn room<V: Lanes>(&self) -> ForceSolver<V> {
+        ForceSolver::new(self.mech)
+    }
+
     #[inline(always)]
-    fn run<V: Lanes>(&self, at: At, answers: &mut Answers<'_, 4>) -> Codes<V> {
+    fn run<V: Lanes>(&self, room: &mut ForceSolver<V>, at: At, answers: &mut Answers<'_, 4>) -> Codes<V> {
         let (mech, [margins, relatives, binding, within]) = (self.mech, Answers::fields());
         let (platform, load, mut codes) = self.states.loaded_at(mech, self.loads, at);
-        let mut forces = [V::lit(f64::NAN); 6];
         if self.forces {
-            let (f, pivots) = inverse_dynamics::inverse_dynamics(mech, &platform, load);
-            let determined = solved(mech, &f, pivots, Codes::<V>::ok()).are(Status::Ok);
-            for k in 0..6 {
-                forces[k] = V::select(determined, f[k], forces[k]);
+            let regular = room.solve_motion(mech, &platform, load);
+            let determined = solved(mech, &room.forces, regular, Codes::<V>::ok()).are(Status::Ok);
+            for force in &mut room.forces {
+                *force = V::select(determined, *force, V::lit(f64::NAN));
             }
             codes = codes.but(determined, Status::Singular);
         }
         let (mut seen, mut binds, mut kept) = (Seen::default(), Binding::default(), V::one());
         for (k, limit) in mech.limits.iter().enumerate() {
-            let margin = limit.margin_at(mech, &platform.pose, &forces, &mut seen);
+            let margin = limit.margin_at(mech, &platform.pose, &room.forces, &mut seen);
             let relative = margin / V::lit(limit.scale);
             answers.put(margins, k, [margin]);
             answers.put(relatives, k, [relative]);

@@ -10,7 +10,6 @@ mod forward_dynamics;
 mod kinematics;
 mod limits;
 mod reactions;
-mod redundant;
 mod singularity;
 
 pub use checks::{CONSTRAINT_TOLERANCE, SINGULAR_PIVOTS};

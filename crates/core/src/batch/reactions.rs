@@ -1,9 +1,9 @@
 //! Joint reactions at many states.
 
-use super::block::{self, Answers, At, Codes, Pieces, Rows, Working};
-use super::checks::{limit_status, then, within_limits};
+use super::block::{self, Answers, At, Codes, Working};
+use super::checks::within_limits;
 use super::dynamics::Loads;
-use super::{FieldId, States, Table};
+use super::{States, Table};
 use crate::dynamics::joint_reactions::{self, Joint};
 use crate::dynamics::self_stress::Solver;
 use crate::model::mechanism::Mechanism;
@@ -30,45 +30,7 @@ pub fn joint_reactions(mech: &Mechanism, states: &States, loads: &Loads, scale: 
         ("constraint_wrench", vec![6]),
     ];
     let operation = JointReactions { mech, joints: &joints, states, loads, scale };
-    if mech.is_redundant() {
-        return redundant(&operation, fields);
-    }
     block::table(&operation, states.len(), fields)
-}
-
-/// Where actuators are redundant, one state after the other.
-fn redundant(operation: &JointReactions, fields: [(&'static str, Vec<usize>); 9]) -> Table {
-    let JointReactions { mech, joints, states, loads, scale } = *operation;
-    block::in_pieces(states.len(), fields, Pieces::SLOW, |rows, piece| {
-        let mut solver = Solver::<f64>::new(mech, joints, scale);
-        for i in piece {
-            let (platform, load, codes) = states.loaded_at::<f64>(mech, loads, At::one(i));
-            let status = then(codes.status(), || {
-                if !solver.solve_redundant(&platform, load) {
-                    return Status::Singular;
-                }
-                put(rows, i, &solver);
-                limit_status(mech, &platform.pose)
-            });
-            rows.set_status(i, status);
-        }
-    })
-}
-
-/// What [`JointReactions`] puts.
-fn put(rows: &mut Rows<'_, 9>, i: usize, solver: &Solver<f64>) {
-    let ids: [FieldId; 9] = block::fields();
-    for (j, place) in solver.places.iter().enumerate() {
-        rows.set(ids[0], i, j, &place.point.array());
-        rows.set(ids[1], i, j, &place.axes.rows().concat());
-        for (k, all) in [&solver.assumed, &solver.least].into_iter().enumerate() {
-            rows.set(ids[2 + 2 * k], i, j, &all[j].array());
-            rows.set(ids[3 + 2 * k], i, j, &place.seen(all[j]).array());
-        }
-        rows.set(ids[6], i, j, &solver.determinate[j]);
-        rows.set(ids[7], i, j, &solver.determinate_in_joint[j]);
-    }
-    rows.set(ids[8], i, 0, &solver.constraint.array());
 }
 
 struct JointReactions<'a> {

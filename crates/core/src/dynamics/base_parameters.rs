@@ -2,12 +2,10 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::dynamics::redundant_actuation;
 use crate::dynamics::regressor::{Parameter, Regressor};
-use crate::kinematics::jacobian;
+use crate::kinematics::jacobian::{MotionSolver, PlatformMotion};
 use crate::kinematics::rows::RowNumbers;
 use crate::mobility::degrees_of_freedom;
-use crate::mobility::singularity;
 use crate::model::mechanism::Mechanism;
 use crate::numerics::random::Draw;
 use crate::spatial::{Acceleration, Mat3, Motion, Pose, Twist};
@@ -105,21 +103,13 @@ fn random_state(mech: &Mechanism, draw: &mut Draw) -> Option<Motion<f64>> {
     let rates: Vec<f64> = (0..driven).map(|_| draw.number() * (gravity * size).sqrt()).collect();
     let accelerations: Vec<f64> = (0..driven).map(|_| draw.number() * gravity).collect();
     let pose = degrees_of_freedom::project(&mech.constraints, size, &start)?;
-    if mech.is_redundant() {
-        // What legs do at random they do not agree on: the motion nearest to it is random, too.
-        let twist = redundant_actuation::platform_twist(mech, &pose, &rates).motion;
-        let found = redundant_actuation::platform_acceleration(mech, &pose, &twist, &accelerations);
-        let Twist { v, omega } = found.motion;
-        let well = singularity::smallest(mech, &pose, size) > PIVOTS;
-        return (found.regular && well).then_some(Motion {
-            pose,
-            twist,
-            acceleration: Acceleration::new(v, omega),
-        });
-    }
-    let (twist, pivots) = jacobian::platform_twist(mech, &pose, &rates);
-    let (acceleration, _) = jacobian::platform_acceleration(mech, &pose, &twist, &accelerations);
-    (pivots > PIVOTS).then_some(Motion { pose, twist, acceleration })
+    // What redundant legs do at random they do not agree on: the motion nearest to it is random, too.
+    let mut solver = MotionSolver::new(mech);
+    solver.driven = rates;
+    let PlatformMotion { motion: twist, regular, .. } = solver.twist(mech, &pose);
+    solver.driven = accelerations;
+    let Twist { v, omega } = solver.acceleration(mech, &pose, &twist).motion;
+    (regular > PIVOTS).then_some(Motion { pose, twist, acceleration: Acceleration::new(v, omega) })
 }
 
 /// Columns that are no combination of those before them, by orthogonalisation in order, and for every column what is

@@ -5,12 +5,11 @@
 //! what it is off by, per unit of the direction, the forces must answer.
 
 use crate::assembly::geometric_parameters::{self, Parameter};
-use crate::dynamics::inverse_dynamics::{Answering, leg_wrench, load_in_base, own_wrench};
-use crate::kinematics::constraint;
+use crate::dynamics::force_balance::UnitForceResponse;
+use crate::dynamics::inverse_dynamics::{leg_wrench, load_in_base, own_wrench};
 use crate::kinematics::coordinate_sets::{self, Following, Set, Values, Variation, Varying};
-use crate::kinematics::idle;
 use crate::kinematics::leg;
-use crate::kinematics::rows::{self, RowNumbers};
+use crate::kinematics::rows::{self, Row, RowNumbers};
 use crate::model::mechanism::{Drive, Leg, Mechanism};
 use crate::model::spec::Axes;
 use crate::number::lanes::Lanes;
@@ -21,59 +20,99 @@ use crate::spatial::{Acceleration, Motion, Pose, Twist, Vec3, Wrench};
 /// o), six of the twist, six of the acceleration.
 pub const DIRECTIONS: usize = 18;
 
-/// Active forces and multipliers, or how they change.
-pub type Column<V> = [V; 6];
-
-/// Inverse dynamics at a state, solved.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Solved<V: Real> {
+/// Inverse dynamics at a state, solved. Forces and multipliers, or how they change, stand in the order of J's rows.
+#[derive(Clone, Copy)]
+pub(crate) struct Solved<'a, V: Real> {
     pub platform: Motion<V>,
     /// The load as it is given, with its axes.
     pub load: (Wrench<V>, Axes),
-    pub forces: Column<V>,
-    pub answering: Answering<V>,
+    pub numbers: RowNumbers,
+    pub forces: &'a [V],
+    /// y of \[T72\] where actuators are redundant, else zero.
+    pub motion: Twist<V>,
+    pub response: &'a UnitForceResponse<V>,
 }
 
-/// Derivatives of active forces and multipliers by the motion in each direction, the other numbers kept.
+/// What a variation takes the balance off by, forces and multipliers kept: the wrench on the platform, and where actuators are
+/// redundant what each row of J then does to y \[T74\].
+struct Imbalance<'a, 'b, V: Real> {
+    at: &'a Solved<'a, V>,
+    wrench: Wrench<Dual<V>>,
+    motion: Twist<Dual<V>>,
+    rows: &'b mut [V],
+}
+
+impl<'a, 'b, V: Lanes> Imbalance<'a, 'b, V> {
+    /// `rows` is room for a number of each row where actuators are redundant, else empty.
+    #[inline(always)]
+    fn new(at: &'a Solved<'a, V>, wrench: Wrench<Dual<V>>, rows: &'b mut [V]) -> Self {
+        rows.fill(V::zero());
+        let motion = Twist::new(at.motion.v.with_rate(Vec3::zero()), at.motion.omega.with_rate(Vec3::zero()));
+        Imbalance { at, wrench, motion, rows }
+    }
+
+    /// Adds a leg's own wrench and that of its kept active force; `row` counts the legs that have one.
+    #[inline(always)]
+    fn add_leg<S: Constant<Dual<V>>>(
+        &mut self,
+        mech: &Mechanism<S>,
+        index: usize,
+        varied: &Motion<Dual<V>>,
+        row: &mut usize,
+    ) {
+        let leg = &mech.legs[index];
+        let place = leg::place(leg, &varied.pose);
+        let mut sum = leg_wrench(mech, index, leg, &place, varied);
+        if leg.actuated {
+            let unit = leg::row(leg, &place.0);
+            sum = sum + unit * Dual::new(self.at.forces[*row], V::zero());
+            if let Some(off) = self.rows.get_mut(*row) {
+                *off = unit.power(&self.motion).d;
+            }
+            *row += 1;
+        }
+        self.wrench = self.wrench + sum;
+    }
+
+    /// Adds what an idle freedom's or a constraint's row does, its multiplier kept.
+    #[inline(always)]
+    fn add_row<S: Constant<Dual<V>>>(&mut self, row: Row<'_, S>, number: usize, pose: &Pose<Dual<V>>) {
+        let unit = row.wrench(pose);
+        self.wrench = self.wrench + unit * Dual::new(self.at.forces[number], V::zero());
+        if let Some(off) = self.rows.get_mut(number) {
+            *off = -unit.power(&self.motion).d;
+        }
+    }
+
+    /// The forces answer it.
+    #[inline(always)]
+    fn put(self, column: &mut [V]) {
+        self.at.response.put(rate(self.wrench), self.rows, column);
+    }
+}
+
+/// Derivatives of active forces and multipliers by the motion in each direction, the other numbers kept: one column for each
+/// direction. `off` is room for a number of each row where actuators are redundant, else empty.
 #[inline(always)]
-pub(crate) fn by_motion<V: Lanes>(mech: &Mechanism, at: &Solved<V>) -> [Column<V>; DIRECTIONS] {
-    let mut columns = [[V::zero(); 6]; DIRECTIONS];
+pub(crate) fn by_motion<V: Lanes>(mech: &Mechanism, at: &Solved<V>, off: &mut [V], columns: &mut [V]) {
+    let width = mech.rows();
     for direction in 0..DIRECTIONS {
         let mut step = [V::zero(); DIRECTIONS];
         step[direction] = V::one();
         let varied = along(&at.platform, &step);
         let (load, axes) = at.load;
         let load = Wrench::new(load.force.with_rate(Vec3::zero()), load.torque.with_rate(Vec3::zero()));
-        let mut sum = own_wrench(mech, &varied, load_in_base(load, axes, &varied.pose));
+        let own = own_wrench(mech, &varied, load_in_base(load, axes, &varied.pose));
+        let mut imbalance = Imbalance::new(at, own, off);
         let mut row = 0;
-        for (i, leg) in mech.legs.iter().enumerate() {
-            sum = sum + with_leg(mech, i, leg, &varied, &at.forces, &mut row);
+        for i in 0..mech.legs.len() {
+            imbalance.add_leg(mech, i, &varied, &mut row);
         }
-        for (other, k) in rows::others(mech).zip(row..) {
-            sum = sum + other.wrench(&varied.pose) * Dual::new(at.forces[k], V::zero());
+        for (other, number) in rows::others(mech).zip(at.numbers.others()) {
+            imbalance.add_row(other, number, &varied.pose);
         }
-        columns[direction] = at.answering.to(rate(sum));
+        imbalance.put(&mut columns[direction * width..(direction + 1) * width]);
     }
-    columns
-}
-
-/// A leg's own wrench on the platform and that of its kept active force; `row` counts the legs that have one.
-#[inline(always)]
-pub(crate) fn with_leg<S: Constant<Dual<V>>, V: Lanes>(
-    mech: &Mechanism<S>,
-    index: usize,
-    leg: &Leg<S>,
-    varied: &Motion<Dual<V>>,
-    forces: &[V],
-    row: &mut usize,
-) -> Wrench<Dual<V>> {
-    let place = leg::place(leg, &varied.pose);
-    let mut sum = leg_wrench(mech, index, leg, &place, varied);
-    if leg.actuated {
-        sum = sum + leg::row(leg, &place.0) * Dual::new(forces[*row], V::zero());
-        *row += 1;
-    }
-    sum
 }
 
 /// The motion as it varies with a step in all directions.
@@ -143,14 +182,12 @@ pub(crate) fn rate<V: Lanes>(w: Wrench<Dual<V>>) -> Wrench<V> {
     Wrench::new(rate_of(w.force), rate_of(w.torque))
 }
 
-/// From the columns by motion to the derivative along a step.
+/// A row of the derivative along a step, from the columns by motion of `width` rows each.
 #[inline(always)]
-fn combined<V: Lanes>(by_motion: &[Column<V>; DIRECTIONS], step: &[V; DIRECTIONS]) -> Column<V> {
-    let mut sum = [V::zero(); 6];
+fn along_step<V: Lanes>(by_motion: &[V], width: usize, row: usize, step: &[V; DIRECTIONS]) -> V {
+    let mut sum = V::zero();
     for k in 0..DIRECTIONS {
-        for i in 0..6 {
-            sum[i] = by_motion[k][i].mul_add(step[k], sum[i]);
-        }
+        sum = by_motion[k * width + row].mul_add(step[k], sum);
     }
     sum
 }
@@ -185,13 +222,17 @@ impl<V: Lanes> Coordinates<V> {
     /// The derivative by a given coordinate that these vary with, or by its rate or second rate (order 1 or 2), the others
     /// of these kept and dependent coordinates following.
     #[inline(always)]
-    pub(crate) fn derivative(
+    pub(crate) fn put_derivative(
         &self,
-        by_motion: &[Column<V>; DIRECTIONS],
+        by_motion: &[V],
         varied: &Variation<V>,
         order: usize,
-    ) -> Column<V> {
-        combined(by_motion, &self.step(varied, order))
+        column: &mut [V],
+    ) {
+        let (step, width) = (self.step(varied, order), column.len());
+        for (row, x) in column.iter_mut().enumerate() {
+            *x = along_step(by_motion, width, row, &step);
+        }
     }
 
     /// How the motion varies then.
@@ -260,45 +301,46 @@ impl Varied {
 }
 
 /// Derivatives of active forces, multipliers and of the lengths of all legs by a number of the geometry, the given
-/// coordinates, their rates and second rates kept and dependent coordinates following.
+/// coordinates, their rates and second rates kept and dependent coordinates following. `off` as in [`by_motion`].
 #[inline(always)]
 pub(crate) fn by_geometry<V: Lanes>(
     varied: &Varied,
-    solved: &Solved<V>,
-    by_motion: &[Column<V>; DIRECTIONS],
-    at: &Coordinates<V>,
+    at: &Solved<V>,
+    coordinates: &Coordinates<V>,
+    by_motion: &[V],
+    off: &mut [V],
+    column: &mut [V],
     lengths: &mut [V],
-) -> Column<V> {
+) {
     let Varied { mech, legs, constraints, moves, .. } = varied;
     // With the motion kept only some legs vary, and the rods that they lead.
-    let still = along(&solved.platform, &[V::zero(); DIRECTIONS]);
-    let mut sum = Wrench::zero();
+    let still = along(&at.platform, &[V::zero(); DIRECTIONS]);
+    let mut imbalance = Imbalance::new(at, Wrench::zero(), off);
     for &i in legs {
         let mut row = 0;
         for other in 0..i {
             row += usize::from(mech.legs[other].actuated);
         }
-        sum = sum + with_leg(mech, i, &mech.legs[i], &still, &solved.forces, &mut row);
+        imbalance.add_leg(mech, i, &still, &mut row);
     }
-    let rows = RowNumbers::of(mech);
-    for (idle, k) in mech.idle.iter().zip(rows.idle()) {
-        sum = sum + idle::row(idle, &still.pose) * Dual::new(solved.forces[k], V::zero());
+    for (idle, number) in mech.idle.iter().zip(at.numbers.idle()) {
+        imbalance.add_row(Row::Idle(idle), number, &still.pose);
     }
     for &k in constraints {
-        let multiplier = Dual::new(solved.forces[rows.constraints().start + k], V::zero());
-        sum = sum + constraint::row(&mech.independent[k], &still.pose) * multiplier;
+        let number = at.numbers.constraints().start + k;
+        imbalance.add_row(Row::Constraint(&mech.independent[k]), number, &still.pose);
     }
-    let (mut column, mut step) = (solved.answering.to(rate(sum)), [V::zero(); DIRECTIONS]);
+    imbalance.put(column);
+    let mut step = [V::zero(); DIRECTIONS];
     if *moves {
-        step = at.following_geometry(varied);
-        let moved = combined(by_motion, &step);
-        for i in 0..6 {
-            column[i] = column[i] + moved[i];
+        step = coordinates.following_geometry(varied);
+        let width = column.len();
+        for (row, x) in column.iter_mut().enumerate() {
+            *x = *x + along_step(by_motion, width, row, &step);
         }
     }
-    let moving = along(&solved.platform, &step);
+    let moving = along(&at.platform, &step);
     for (i, leg) in mech.legs.iter().enumerate() {
         lengths[i] = leg::position(leg, &moving.pose).coordinate.d;
     }
-    column
 }

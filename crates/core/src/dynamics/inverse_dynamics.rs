@@ -1,13 +1,13 @@
 //! Inverse dynamics by virtual power: every link's weight and inertia is carried to the platform's twist by the
 //! transpose of its own Jacobian, then actuators and constraints balance the sum [Eq. 40-43] \[T13\]-\[T17\].
 
-use crate::kinematics::jacobian::{scaled, scaled_jacobian};
+use crate::kinematics::jacobian::scaled;
 use crate::kinematics::leg;
 use crate::kinematics::rows::{self, Matrix6};
 use crate::model::mechanism::{Body, Drive, Leg, Mechanism, Rod};
 use crate::model::spec::Axes;
 use crate::number::real::{Constant, Real};
-use crate::numerics::gauss::{solve, solve_all};
+use crate::numerics::gauss::solve;
 use crate::spatial::{Acceleration, Mat3, Motion, Pose, Twist, Vec3, Wrench};
 
 /// The load on the platform at o; in platform axes it turns with the platform.
@@ -191,17 +191,13 @@ pub fn inverse_dynamics<T: Real>(
     platform: &Motion<T>,
     load: Wrench<T>,
 ) -> ([T; 6], T::Value) {
-    let mut balance = Balance::new(mech, platform, load);
-    for (i, leg) in mech.legs.iter().enumerate() {
-        balance.add(mech, i, leg, &leg::place(leg, &platform.pose), platform);
-    }
-    balance.solved(mech, &platform.pose)
+    Balance::of(mech, platform, load).solved(mech, &platform.pose)
 }
 
-/// [Eq. 43] as it is set up, leg by leg: the braces, and the rows of J.
+/// [Eq. 43] as it is set up, leg by leg: the braces, and the first six rows of J.
 #[derive(Clone, Copy, Debug)]
 pub struct Balance<T> {
-    wrench: Wrench<T>,
+    pub wrench: Wrench<T>,
     rows: Matrix6<T>,
     count: usize,
 }
@@ -210,6 +206,16 @@ impl<T: Real> Balance<T> {
     #[inline(always)]
     pub fn new<S: Constant<T>>(mech: &Mechanism<S>, platform: &Motion<T>, load: Wrench<T>) -> Self {
         Balance { wrench: own_wrench(mech, platform, load), rows: [[T::zero(); 6]; 6], count: 0 }
+    }
+
+    /// With all legs.
+    #[inline(always)]
+    pub fn of<S: Constant<T>>(mech: &Mechanism<S>, platform: &Motion<T>, load: Wrench<T>) -> Self {
+        let mut balance = Balance::new(mech, platform, load);
+        for (i, leg) in mech.legs.iter().enumerate() {
+            balance.add(mech, i, leg, &leg::place(leg, &platform.pose), platform);
+        }
+        balance
     }
 
     /// Adds the next leg, at its place.
@@ -223,7 +229,8 @@ impl<T: Real> Balance<T> {
         platform: &Motion<T>,
     ) {
         self.wrench = self.wrench + leg_wrench(mech, index, leg, place, platform);
-        if leg.actuated {
+        // Where more legs are actuated J is not square, and is set up elsewhere.
+        if leg.actuated && self.count < 6 {
             self.rows[self.count] = leg::row(leg, &place.0).array();
             self.count += 1;
         }
@@ -243,37 +250,6 @@ impl<T: Real> Balance<T> {
         }
         let solved = solve(transposed(&scaled(mech, self.rows)), rhs);
         (solved.x, solved.pivots)
-    }
-}
-
-/// What balances any wrench on the platform at o: active forces and multipliers for each unit force and torque \[T15\].
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Answering<T: Real> {
-    columns: Matrix6<T>,
-    pub pivots: T::Value,
-}
-
-impl<T: Real> Answering<T> {
-    #[inline(always)]
-    pub(crate) fn at(mech: &Mechanism<impl Constant<T>>, pose: &Pose<T>) -> Self {
-        let inverse = T::lit(1.0 / mech.characteristic_length);
-        let mut rhs = [[T::zero(); 6]; 6];
-        for k in 0..6 {
-            rhs[k][k] = if k < 3 { -T::one() } else { -inverse };
-        }
-        let solved = solve_all(transposed(&scaled_jacobian(mech, pose)), rhs);
-        Answering { columns: solved.x, pivots: solved.pivots }
-    }
-
-    #[inline(always)]
-    pub(crate) fn to(&self, w: Wrench<T>) -> [T; 6] {
-        let (w, mut sum) = (w.array(), [T::zero(); 6]);
-        for k in 0..6 {
-            for i in 0..6 {
-                sum[i] = self.columns[k][i].mul_add(w[k], sum[i]);
-            }
-        }
-        sum
     }
 }
 

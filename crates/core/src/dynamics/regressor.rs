@@ -1,8 +1,8 @@
 //! Inertial parameters of the links, and the regressor: forces are linear in the parameters, so that their
 //! coefficients are the forces of unit parameters \[T57\].
 
-use crate::dynamics::inverse_dynamics::{self, Answering};
-use crate::dynamics::redundant_actuation::Parted;
+use crate::dynamics::force_balance::UnitForceResponse;
+use crate::dynamics::inverse_dynamics;
 use crate::kinematics::leg;
 use crate::model::mechanism::{Body, Drive, Leg, Mechanism, Turning};
 use crate::number::real::{Dual, Real};
@@ -200,28 +200,14 @@ impl Regressor {
     /// For each parameter the active forces and multipliers that its unit asks for: the columns of Y \[T57\].
     pub fn columns(&self, mech: &Mechanism, platform: &Motion<f64>) -> Vec<Vec<f64>> {
         let legs: Vec<_> = mech.legs.iter().map(|leg| leg::state(leg, platform)).collect();
-        let count = self.parameters.len();
-        if mech.is_redundant() {
-            let Some(parted) = Parted::at(mech, &platform.pose) else {
-                return vec![vec![f64::NAN; mech.rows()]; count];
-            };
-            return (0..count).map(|k| parted.answer(self.wrench(mech, platform, &legs, k))).collect();
-        }
-        let answering = Answering::at(mech, &platform.pose);
-        (0..count).map(|k| self.column(mech, platform, &legs, &answering, k).to_vec()).collect()
-    }
-
-    /// The k-th column, from the states of all legs.
-    #[inline(always)]
-    pub(crate) fn column<T: Real>(
-        &self,
-        mech: &Mechanism,
-        platform: &Motion<T>,
-        legs: &[leg::State<T>],
-        answering: &Answering<T>,
-        k: usize,
-    ) -> [T; 6] {
-        answering.to(self.wrench(mech, platform, legs, k))
+        let mut response = UnitForceResponse::new(mech);
+        response.set(mech, &platform.pose);
+        let column = |k: usize| {
+            let mut column = vec![0.0; mech.rows()];
+            response.put(self.wrench(mech, platform, &legs, k), &[], &mut column);
+            column
+        };
+        (0..self.parameters.len()).map(column).collect()
     }
 
     /// What a unit of the k-th parameter puts on the platform.
@@ -254,44 +240,23 @@ impl Regressor {
         sum
     }
 
-    /// What load and damping ask for: the active forces and multipliers with all parameters zero.
-    #[inline(always)]
-    pub(crate) fn offset<T: Real>(
-        mech: &Mechanism,
-        twist: &Twist<T>,
-        load: Wrench<T>,
-        answering: &Answering<T>,
-    ) -> [T; 6] {
-        answering.to(Self::rest(mech, twist, load))
-    }
-
     /// What load and damping put on the platform.
     #[inline(always)]
     pub(crate) fn rest<T: Real>(mech: &Mechanism, twist: &Twist<T>, load: Wrench<T>) -> Wrench<T> {
         (load + inverse_dynamics::damping_wrench(mech, twist)) * T::lit(1.0 / mech.efficiency)
     }
 
-    /// From the columns of Y to the k-th of the derivatives by mass, mass centre, and inertia about it \[T57\].
+    /// From the columns of Y, one after the other, to the k-th of the derivatives by mass, mass centre, and inertia about it
+    /// \[T57\].
     #[inline(always)]
-    pub(crate) fn by_bodies<T: Real>(&self, columns: &[[T; 6]], k: usize) -> [T; 6] {
-        let mut sum = [T::zero(); 6];
+    pub(crate) fn put_by_bodies<T: Real>(&self, columns: &[T], k: usize, sum: &mut [T]) {
+        let width = sum.len();
+        sum.fill(T::zero());
         for &(column, factor) in &self.by_bodies[k] {
-            for i in 0..6 {
-                sum[i] = sum[i] + columns[column][i].scale(factor);
+            for (row, x) in sum.iter_mut().enumerate() {
+                *x = *x + columns[column * width + row].scale(factor);
             }
         }
-        sum
-    }
-
-    /// The same of columns of any length.
-    pub(crate) fn by_bodies_of(&self, columns: &[Vec<f64>], k: usize) -> Vec<f64> {
-        let mut sum = vec![0.0; columns[k].len()];
-        for &(column, factor) in &self.by_bodies[k] {
-            for (sum, x) in sum.iter_mut().zip(&columns[column]) {
-                *sum += x * factor;
-            }
-        }
-        sum
     }
 }
 

@@ -1,16 +1,16 @@
 //! Reactions where several will do: all that balance the links, the self-stresses that they differ by, and the two choices
 //! among them \[T46\] \[T47\]. For one state or for one in each lane, in room that is made once.
 
+use crate::dynamics::force_balance::ForceSolver;
 use crate::dynamics::joint_reactions::{
     Given, Joint, Place, constraint_wrench, pure, put_places, put_reactions, put_unbalanced,
 };
-use crate::dynamics::redundant_actuation::{self, Parted};
 use crate::kinematics::idle;
 use crate::model::mechanism::{Drive, Mechanism};
 use crate::model::spec::JointKind;
 use crate::number::lanes::{Lanes, any};
 use crate::number::real::{Mask, Real};
-use crate::numerics::householder::Orthogonal;
+use crate::numerics::householder::Householder;
 use crate::spatial::{Motion, Pose, Vec3, Wrench};
 
 /// Least to greatest singular value of the platform's and the rods' balances below which the pose is singular.
@@ -56,11 +56,7 @@ pub fn solve(
     scale: f64,
 ) -> Option<Reactions> {
     let mut solver = Solver::new(mech, joints, scale);
-    let holds = if mech.is_redundant() {
-        solver.solve_redundant(platform, load)
-    } else {
-        solver.solve(platform, load)
-    };
+    let holds = solver.solve(platform, load);
     let flags = |marks: &[[f64; 6]]| marks.iter().map(|marks| marks.map(|mark| mark > 0.0)).collect();
     holds.then(|| Reactions {
         determinate: flags(&solver.determinate),
@@ -83,11 +79,13 @@ pub(crate) struct Solver<'a, V> {
     given: Given<V>,
     none: Given<V>,
     /// The balances of platform and rods, unknown being the shares of what the legs can carry.
-    system: Orthogonal<V>,
+    system: Householder<V>,
     unknowns: Vec<V>,
     on_platform: Vec<Wrench<V>>,
     unbalanced: Vec<V>,
     choice: Choice<V>,
+    /// Where actuators are redundant.
+    forces: Option<ForceSolver<V>>,
     pub places: Vec<Place<V>>,
     /// See [`Reactions`]; 1 for components that are determinate, else 0.
     pub assumed: Vec<Wrench<V>>,
@@ -102,7 +100,7 @@ pub(crate) struct Solver<'a, V> {
 struct LegBalance<V> {
     /// What its joints leave free: the joint, from base to platform, and the component.
     free: Vec<(usize, usize)>,
-    system: Orthogonal<V>,
+    system: Householder<V>,
     /// The first of its columns in the whole.
     first: usize,
     /// The active force, where it is given.
@@ -127,7 +125,7 @@ impl<V: Lanes> LegBalance<V> {
         }
         let carried = vec![Wrench::zero(); 6 - free.len()];
         LegBalance {
-            system: Orthogonal::new(free.len(), 6),
+            system: Householder::new(free.len(), 6),
             free,
             first,
             push: V::zero(),
@@ -168,7 +166,7 @@ impl<V: Lanes> LegBalance<V> {
         self.particular = Wrench::from_array(rhs);
         for k in 0..self.carried.len() {
             let mut x = [V::zero(); 6];
-            self.system.open(k, &mut x);
+            self.system.null_vector(k, &mut x);
             self.carried[k] = Wrench::from_array(x);
         }
     }
@@ -207,11 +205,12 @@ impl<'a, V: Lanes> Solver<'a, V> {
             given: Given::none(mech),
             none: Given::none(mech),
             // Fewer unknowns than equations has a design that actuators do not control: it has no answer.
-            system: Orthogonal::new(rows, count.max(rows)),
+            system: Householder::new(rows, count.max(rows)),
             unknowns: vec![V::zero(); count.max(rows)],
             on_platform: vec![Wrench::zero(); mech.legs.len()],
             unbalanced: vec![V::zero(); free + 6],
             choice: Choice::new(joints, count.saturating_sub(rows), mech.characteristic_length, scale),
+            forces: mech.is_redundant().then(|| ForceSolver::new(mech)),
             places: vec![Place::nowhere(); all],
             assumed: vec![Wrench::zero(); all],
             least: vec![Wrench::zero(); all],
@@ -224,12 +223,34 @@ impl<'a, V: Lanes> Solver<'a, V> {
     /// Finds all reactions that keep up a motion under load; tells where there are any, which is not at singular poses.
     #[inline(always)]
     pub(crate) fn solve(&mut self, platform: &Motion<V>, load: Wrench<V>) -> Mask<V> {
-        let mech = self.mech;
+        let (mech, pose) = (self.mech, &platform.pose);
         self.given.set(mech, platform, load);
-        for k in 0..mech.idle.len() {
-            self.props[k] = Wrench::new(Vec3::zero(), idle::axis(&mech.idle[k], &platform.pose));
+        let Some(forces) = &mut self.forces else {
+            for k in 0..mech.idle.len() {
+                self.props[k] = Wrench::new(Vec3::zero(), idle::axis(&mech.idle[k], pose));
+            }
+            return self.solve_given(pose);
+        };
+        // Redundant actuators push with their least forces \[T72\], which leave the platform's freedoms nothing to hold: what
+        // the props hold shows as an error.
+        let regular = forces.solve_motion(mech, platform, load);
+        let mut row = 0;
+        for (leg, balance) in mech.legs.iter().zip(&mut self.legs) {
+            balance.push = if leg.actuated { forces.forces[row] } else { V::zero() };
+            row += usize::from(leg.actuated);
         }
-        self.solve_given(&platform.pose)
+        for (idle, torque) in mech.idle.iter().zip(&forces.forces[forces.numbers.idle()]) {
+            self.given.platform = self.given.platform + idle::row(idle, pose) * *torque;
+        }
+        let mut twists = [[V::zero(); 6]; 6];
+        let count = self.props.len();
+        forces.put_freedoms(&mut twists[..count]);
+        for (prop, twist) in self.props.iter_mut().zip(twists) {
+            *prop = Wrench::from_array(twist);
+        }
+        let holds = self.solve_given(pose);
+        let known = V::select(holds, V::one(), V::zero());
+        V::select(regular.greater(V::lit(SINGULAR)), known, V::zero()).greater(V::zero())
     }
 
     /// Balances what is given.
@@ -249,7 +270,7 @@ impl<'a, V: Lanes> Solver<'a, V> {
         let holds = self.holds(pose.o, regular);
 
         for k in 0..self.choice.count {
-            self.system.open(k, &mut self.unknowns);
+            self.system.null_vector(k, &mut self.unknowns);
             self.put_on_platform(false);
             let stress = &mut self.choice.stresses[k * self.places.len()..(k + 1) * self.places.len()];
             put_reactions(mech, &self.places, &self.none, &self.on_platform, stress);
@@ -393,26 +414,6 @@ impl<'a, V: Lanes> Solver<'a, V> {
     }
 }
 
-impl Solver<'_, f64> {
-    /// The same where actuators are redundant: with their least forces \[T72\], which leave the platform's freedoms nothing to
-    /// hold. What the props hold shows as an error.
-    pub(crate) fn solve_redundant(&mut self, platform: &Motion<f64>, load: Wrench<f64>) -> bool {
-        let (mech, pose) = (self.mech, &platform.pose);
-        let Some(parted) = Parted::at(mech, pose).filter(|parted| parted.regular) else { return false };
-        let found = redundant_actuation::inverse_dynamics(mech, platform, load, &[]);
-        let mut forces = found.forces.iter();
-        for (leg, balance) in mech.legs.iter().zip(&mut self.legs) {
-            balance.push = if leg.actuated { forces.next().copied().unwrap_or(f64::NAN) } else { 0.0 };
-        }
-        self.given.set(mech, platform, load);
-        for (idle, torque) in mech.idle.iter().zip(&found.multipliers) {
-            self.given.platform = self.given.platform + idle::row(idle, pose) * *torque;
-        }
-        self.props = parted.freedoms(mech.idle.len());
-        self.solve_given(pose)
-    }
-}
-
 /// The sum and the squares of a wrench's components.
 #[inline(always)]
 fn add_square<V: Real>(w: Wrench<V>, mut sum: V) -> V {
@@ -438,7 +439,7 @@ struct Choice<V> {
     couples: Vec<V>,
     sizes: Vec<V>,
     /// Products of the self-stresses.
-    system: Orthogonal<V>,
+    system: Householder<V>,
     shares: Vec<V>,
 }
 
@@ -455,7 +456,7 @@ impl<V: Lanes> Choice<V> {
             couples: vec![V::zero(); count * universal.len()],
             universal,
             sizes: vec![V::zero(); count],
-            system: Orthogonal::new(count, count),
+            system: Householder::new(count, count),
             shares: vec![V::zero(); count],
         }
     }

@@ -4,12 +4,12 @@
 //! number of solutions for almost all lengths. All of them are found once for generic complex lengths; from there they
 //! are followed along a path of lengths to the ones that are asked for, and the real ones kept.
 
-use crate::dynamics::redundant_actuation;
 use crate::forward_kinematics::gauss_newton;
 use crate::forward_kinematics::homotopy::{C, End, Lengths, Path, modulus};
 use crate::forward_kinematics::newton::{self, Asked, Found, system};
 use crate::forward_kinematics::start_system::Products;
 use crate::kinematics::leg;
+use crate::mobility::sufficient_actuators::sufficient_actuators;
 use crate::model::mechanism::Idle;
 use crate::model::mechanism::{Drive, Leg, Mechanism};
 use crate::model::spec::Axes;
@@ -168,7 +168,7 @@ pub fn start(mech: &Mechanism) -> Option<Start> {
         return None;
     }
     if mech.is_redundant() {
-        let square = redundant_actuation::square(mech)?;
+        let square = sufficient_actuators(mech)?;
         let found = start(&square)?;
         return Some(Start { square: Some(Box::new(square)), ..found });
     }

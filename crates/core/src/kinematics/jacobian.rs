@@ -1,10 +1,12 @@
 //! The completed Jacobian and Hessian: rows of the actuated legs over those of idle freedoms and of the independent
-//! constraints, and the solves with them. Of mechanisms with six rows; [`redundant`](crate::dynamics::redundant_actuation) has those with more.
+//! constraints, and the solves with them.
 
 use crate::kinematics::quadratic_forms::{Hessian, quadratic};
-use crate::kinematics::rows::{self, Matrix6};
+use crate::kinematics::redundant_rows::RedundantRows;
+use crate::kinematics::rows::{self, Matrix6, RowNumbers};
 use crate::model::mechanism::Mechanism;
-use crate::number::real::{Constant, Real};
+use crate::number::lanes::Lanes;
+use crate::number::real::{Constant, Ordered, Real};
 use crate::numerics::gauss::solve;
 use crate::spatial::{Acceleration, Pose, Twist};
 
@@ -90,4 +92,85 @@ fn padded<T: Real>(values: &[T]) -> [T; 6] {
     let mut padded = [T::zero(); 6];
     padded[..values.len()].copy_from_slice(values);
     padded
+}
+
+/// A motion from what the legs do.
+#[derive(Clone, Copy, Debug)]
+pub struct PlatformMotion<V: Ordered> {
+    /// Twist, or acceleration, of o.
+    pub motion: Twist<V>,
+    /// Pivot ratio of J, or a lower bound of its singular values' ratio.
+    pub regular: V,
+    /// Whether the legs agree on it, as those of square J always do.
+    pub agrees: V::Mask,
+}
+
+/// Finds motions of the platform from those of its legs: by Gaussian elimination where J is square, in the sense of least squares
+/// where actuators are redundant \[T73\]. Room for one state after another.
+pub struct MotionSolver<V> {
+    /// Rates or accelerations of the actuated legs, then of idle freedoms: none of these if they do not spin.
+    pub driven: Vec<V>,
+    rest: Vec<V>,
+    redundant: Option<RedundantRows<V>>,
+}
+
+impl<V: Lanes> MotionSolver<V> {
+    #[must_use]
+    pub fn new(mech: &Mechanism) -> Self {
+        MotionSolver {
+            driven: Vec::with_capacity(mech.legs.len()),
+            rest: vec![],
+            redundant: mech.is_redundant().then(|| RedundantRows::new(mech)),
+        }
+    }
+
+    /// The twist that gives the legs their rates [Eq. 13].
+    #[inline(always)]
+    pub fn twist(&mut self, mech: &Mechanism, pose: &Pose<V>) -> PlatformMotion<V> {
+        let Some(rows) = &mut self.redundant else {
+            let (motion, regular) = platform_twist(mech, pose, &self.driven);
+            return PlatformMotion { motion, regular, agrees: all::<V>() };
+        };
+        rows.factor(mech, pose);
+        let (legs, idle) = self.driven.split_at(RowNumbers::of(mech).actuated().end);
+        let (motion, agrees) = rows.follow(legs, idle, norm(legs));
+        PlatformMotion { motion, regular: rows.regular, agrees }
+    }
+
+    /// The acceleration that gives the legs theirs [Eq. 19].
+    #[inline(always)]
+    pub fn acceleration(&mut self, mech: &Mechanism, pose: &Pose<V>, twist: &Twist<V>) -> PlatformMotion<V> {
+        let Some(rows) = &mut self.redundant else {
+            let (Acceleration { a, eps }, regular) = platform_acceleration(mech, pose, twist, &self.driven);
+            return PlatformMotion { motion: Twist::new(a, eps), regular, agrees: all::<V>() };
+        };
+        rows.factor(mech, pose);
+        let (v, n) = (twist.array(), RowNumbers::of(mech).actuated().end);
+        self.rest.clear();
+        for row in rows::of(mech) {
+            self.rest.push(quadratic(&row.hessian(pose), &v));
+        }
+        let size = norm(&self.driven[..n]) + norm(&self.rest[..n]);
+        for (k, rest) in self.rest.iter_mut().enumerate() {
+            *rest = self.driven.get(k).copied().unwrap_or_else(V::zero) - *rest;
+        }
+        let (legs, others) = self.rest.split_at(n);
+        let (motion, agrees) = rows.follow(legs, others, size);
+        PlatformMotion { motion, regular: rows.regular, agrees }
+    }
+}
+
+/// True in all lanes.
+#[inline(always)]
+fn all<V: Ordered>() -> V::Mask {
+    V::zero().at_most(V::zero())
+}
+
+#[inline(always)]
+fn norm<V: Ordered>(values: &[V]) -> V {
+    let mut square = V::zero();
+    for x in values {
+        square = x.mul_add(*x, square);
+    }
+    square.sqrt()
 }

@@ -6,4 +6,5 @@ pub mod jacobian;
 pub mod leg;
 pub mod passive_joints;
 pub mod quadratic_forms;
+pub mod redundant_rows;
 pub mod rows;

@@ -2,3 +2,4 @@ pub mod degrees_of_freedom;
 pub mod screw_systems;
 pub mod singularity;
 pub mod singularity_distance;
+pub mod sufficient_actuators;

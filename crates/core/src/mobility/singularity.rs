@@ -160,10 +160,7 @@ fn rounded<V: Ordered>(det: Dual<V>, size: V) -> Dual<V> {
 /// The smallest singular value of J in pure numbers; NaN where an actuated leg has no direction.
 #[must_use]
 pub fn smallest(mech: &Mechanism, pose: &Pose<f64>, scale: f64) -> f64 {
-    if mech.is_redundant() {
-        return values_and_vectors(&pure_rows(mech, pose, scale)).0[5];
-    }
-    values_and_vectors(&pure_jacobian(mech, pose, scale)).0[5]
+    values_and_vectors(&pure_rows(mech, pose, scale)).0[5]
 }
 
 /// Singular values, largest first, and right singular vectors of rows of six; NaN if an entry is.

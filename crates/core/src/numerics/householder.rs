@@ -1,12 +1,12 @@
-//! Fewer equations than unknowns, or as many: the least solution, and what is left open, by orthogonal reflections
-//! (Golub and Van Loan, Matrix Computations, sections 5.2 and 5.5). No branch on a value, and no allocation once it is
-//! made.
+//! Householder factorisation of a matrix with no more rows than columns: solutions of least norm, least squares with its
+//! transpose, and its null space (Golub and Van Loan, Matrix Computations, sections 5.2 and 5.5). No branch on a value,
+//! and no allocation once it is made.
 
 use crate::number::real::Ordered;
 
 /// `m = L Qᵀ` of a matrix with no more rows than columns: L lower triangular, Q a product of Householder reflections.
 #[derive(Clone, Debug)]
-pub struct Orthogonal<V> {
+pub struct Householder<V> {
     rows: usize,
     columns: usize,
     /// Row by row: the matrix; once factored, L below the diagonal and each reflection's vector from there on.
@@ -20,12 +20,12 @@ pub struct Orthogonal<V> {
     column: Vec<V>,
 }
 
-impl<V: Ordered> Orthogonal<V> {
+impl<V: Ordered> Householder<V> {
     /// Room for a matrix.
     #[must_use]
     pub fn new(rows: usize, columns: usize) -> Self {
         let zeros = |count: usize| vec![V::zero(); count];
-        Orthogonal {
+        Householder {
             rows,
             columns,
             entries: zeros(rows * columns),
@@ -40,6 +40,13 @@ impl<V: Ordered> Orthogonal<V> {
     #[inline(always)]
     pub fn set(&mut self, row: usize, column: usize, x: V) {
         self.entries[row * self.columns + column] = x;
+    }
+
+    /// Sets a row of the matrix.
+    #[inline(always)]
+    pub fn set_row(&mut self, row: usize, entries: &[V]) {
+        let start = row * self.columns;
+        self.entries[start..start + self.columns].copy_from_slice(entries);
     }
 
     #[inline(always)]
@@ -69,9 +76,38 @@ impl<V: Ordered> Orthogonal<V> {
         }
     }
 
-    /// Puts the least x with `m x = b` in place of b, which is followed by zeros.
+    /// The x of least norm with `m x = b`, in place of b, which is followed by zeros.
     #[inline(always)]
     pub fn solve(&self, x: &mut [V]) {
+        self.solve_lower(x);
+        self.rotate(x);
+    }
+
+    /// The y that makes `|mᵀ y - b|` least, in place of the beginning of b.
+    #[inline(always)]
+    pub fn solve_transposed(&self, y: &mut [V]) {
+        self.rotate_back(y);
+        self.solve_upper(y);
+    }
+
+    /// The k-th of the orthonormal vectors that span the null space of m.
+    #[inline(always)]
+    pub fn null_vector(&self, k: usize, x: &mut [V]) {
+        self.orthonormal_vector(self.rows + k, x);
+    }
+
+    /// The k-th column of Q: perpendicular to the first k rows of m.
+    #[inline(always)]
+    pub fn orthonormal_vector(&self, k: usize, x: &mut [V]) {
+        for j in 0..self.columns {
+            x[j] = V::lit(f64::from(u8::from(j == k)));
+        }
+        self.rotate(x);
+    }
+
+    /// `L⁻¹ x`.
+    #[inline(always)]
+    pub fn solve_lower(&self, x: &mut [V]) {
         for k in 0..self.rows {
             let mut sum = x[k];
             for j in 0..k {
@@ -79,23 +115,33 @@ impl<V: Ordered> Orthogonal<V> {
             }
             x[k] = sum * self.inverses[k];
         }
-        self.turn(x);
     }
 
-    /// Puts the k-th of the orthonormal vectors that m takes to zero.
+    /// `L⁻ᵀ x`.
     #[inline(always)]
-    pub fn open(&self, k: usize, x: &mut [V]) {
-        for j in 0..self.columns {
-            x[j] = V::lit(f64::from(u8::from(j == self.rows + k)));
+    pub fn solve_upper(&self, x: &mut [V]) {
+        for k in (0..self.rows).rev() {
+            let mut sum = x[k];
+            for j in k + 1..self.rows {
+                sum = (-self.entries[j * self.columns + k]).mul_add(x[j], sum);
+            }
+            x[k] = sum * self.inverses[k];
         }
-        self.turn(x);
     }
 
-    /// Q x.
+    /// `Q x`.
     #[inline(always)]
-    fn turn(&self, x: &mut [V]) {
+    pub fn rotate(&self, x: &mut [V]) {
+        for k in (0..self.rows).rev() {
+            let v = &self.entries[k * self.columns..(k + 1) * self.columns];
+            reflect(&v[k..], self.shares[k], &mut x[k..]);
+        }
+    }
+
+    /// `Qᵀ x`.
+    #[inline(always)]
+    pub fn rotate_back(&self, x: &mut [V]) {
         for k in 0..self.rows {
-            let k = self.rows - 1 - k;
             let v = &self.entries[k * self.columns..(k + 1) * self.columns];
             reflect(&v[k..], self.shares[k], &mut x[k..]);
         }
@@ -140,8 +186,8 @@ mod tests {
     use crate::numerics::svd::Svd;
     use nalgebra::{DMatrix, DVector};
 
-    fn factored(m: &DMatrix<f64>) -> Orthogonal<f64> {
-        let mut all = Orthogonal::new(m.nrows(), m.ncols());
+    fn factored(m: &DMatrix<f64>) -> Householder<f64> {
+        let mut all = Householder::new(m.nrows(), m.ncols());
         for i in 0..m.nrows() {
             for j in 0..m.ncols() {
                 all.set(i, j, m[(i, j)]);
@@ -166,7 +212,7 @@ mod tests {
             let open: Vec<_> = (0..columns - rows)
                 .map(|k| {
                     let mut y = vec![0.0; columns];
-                    found.open(k, &mut y);
+                    found.null_vector(k, &mut y);
                     DVector::from_vec(y)
                 })
                 .collect();
@@ -176,6 +222,12 @@ mod tests {
                     assert!((y.dot(other) - f64::from(u8::from(j == k))).abs() < 1e-14);
                 }
             }
+            // Least squares with the transpose: what is missed is perpendicular to its columns.
+            let c = DVector::from_fn(columns, |_, _| draw.number());
+            let mut y = c.as_slice().to_vec();
+            found.solve_transposed(&mut y);
+            let missed = m.transpose() * DVector::from_column_slice(&y[..rows]) - c;
+            assert!((&m * &missed).norm() < 1e-13 * (1.0 + missed.norm()));
             if rows > 0 {
                 let sigma = Svd::of(&m.transpose()).unwrap().values;
                 let (ratio, told) = (sigma[rows - 1] / sigma[0], found.reciprocal_condition());

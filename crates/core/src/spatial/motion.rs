@@ -3,7 +3,7 @@
 //! Six-vectors have their linear part first and are taken at the platform's point o, in base axes.
 //! An acceleration is the classical one: its linear part is the acceleration of the point o.
 
-use std::ops::{Add, Mul, Sub};
+use std::ops::{Add, Mul, Neg, Sub};
 
 use crate::number::real::{Dual, Jet, Real};
 use crate::spatial::vector::{Mat3, Vec3};
@@ -168,6 +168,14 @@ impl<T: Real> Sub for Wrench<T> {
     #[inline(always)]
     fn sub(self, b: Self) -> Self {
         Wrench::new(self.force - b.force, self.torque - b.torque)
+    }
+}
+
+impl<T: Real> Neg for Wrench<T> {
+    type Output = Self;
+    #[inline(always)]
+    fn neg(self) -> Self {
+        Wrench::new(-self.force, -self.torque)
     }
 }
 

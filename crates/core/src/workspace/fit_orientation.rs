@@ -1,7 +1,7 @@
 //! Whether the platform can be at a place: a pose with its point o there that keeps constraints and limits \[T39\].
 
+use crate::dynamics::force_balance::ForceSolver;
 use crate::dynamics::inverse_dynamics;
-use crate::dynamics::redundant_actuation;
 use crate::kinematics::constraint;
 use crate::kinematics::leg;
 use crate::model::limit::{Limit, Measure};
@@ -109,10 +109,9 @@ fn checked(mech: &Mechanism, pose: &Pose<f64>) -> bool {
 fn forces_at_rest(mech: &Mechanism, pose: &Pose<f64>) -> Vec<f64> {
     let rest = Motion { pose: *pose, twist: Twist::zero(), acceleration: Acceleration::zero() };
     let load = inverse_dynamics::load_in_base(mech.load.wrench, mech.load.axes, pose);
-    if mech.is_redundant() {
-        return redundant_actuation::inverse_dynamics(mech, &rest, load, &[]).forces;
-    }
-    inverse_dynamics::inverse_dynamics(mech, &rest, load).0.to_vec()
+    let mut solver = ForceSolver::new(mech);
+    solver.solve_motion(mech, &rest, load);
+    solver.forces
 }
 
 /// The margins of all limits at a pose, each in its own unit.
