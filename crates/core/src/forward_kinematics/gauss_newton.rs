@@ -8,7 +8,8 @@ use crate::forward_kinematics::newton::{
 };
 use crate::kinematics::constraint;
 use crate::kinematics::leg;
-use crate::kinematics::rows::{self, Row, pure_rows};
+use crate::kinematics::redundant_rows::RedundantRows;
+use crate::kinematics::rows::{self, Row};
 use crate::mobility::degrees_of_freedom::RANK_TOLERANCE;
 use crate::model::mechanism::{Leg, Mechanism};
 use crate::model::status::Status;
@@ -44,55 +45,89 @@ pub fn serves(mech: &Mechanism) -> bool {
 
 /// What a pose misses, in pure numbers, and the step that takes most of it off.
 struct Misses {
-    legs: DVector<f64>,
-    others: DVector<f64>,
+    legs: Vec<f64>,
+    others: Vec<f64>,
     /// (v/Λ, ω), and its size.
     step: [f64; 6],
     size: f64,
     /// What is left of the square of what lengths miss, if rows stay as they are.
     left: f64,
-    /// Least to greatest singular value of the legs' rows on what the others allow.
+    /// Least to greatest singular value of the legs' rows on what the others allow, or a lower bound of it.
     pivots: f64,
 }
 
 impl Misses {
-    fn at(mech: &Mechanism, asked: &[Asked<f64>], pose: &Pose<f64>) -> Option<Self> {
-        let (scale, n) = (mech.characteristic_length, asked.len());
+    fn at(
+        mech: &Mechanism,
+        asked: &[Asked<f64>],
+        pose: &Pose<f64>,
+        room: Option<&mut RedundantRows<f64>>,
+    ) -> Option<Self> {
+        let scale = mech.characteristic_length;
         // Rows and errors of the lengths from the places that are asked for: those of a slider have no branch.
         let of_leg = |((_, leg), asked): ((usize, &Leg), &Asked<f64>)| {
             let (e, r) = leg::vectors(leg, pose);
             let r = asked.vector(leg, r);
-            (pure_row(Wrench::at(e, r.unit()), scale), r.norm() - asked.square.sqrt())
+            (pure_row(Wrench::at(e, r.unit()), scale), (r.norm() - asked.square.sqrt()) / scale)
         };
-        let (of_legs, short): (Vec<[f64; 6]>, Vec<f64>) = mech.actuated().zip(asked).map(of_leg).unzip();
+        let (rows, legs): (Vec<[f64; 6]>, Vec<f64>) = mech.actuated().zip(asked).map(of_leg).unzip();
         let off = |row| match row {
-            Row::Constraint(c) => constraint::value(c, pose) * constraint::length(c, scale),
+            Row::Constraint(c) => constraint::value(c, pose) * constraint::length(c, scale) / scale,
             Row::Leg(_) | Row::Idle(_) => 0.0,
         };
-        let legs = DVector::from_vec(short) / scale;
-        let others = DVector::from_vec(rows::others(mech).map(off).collect()) / scale;
-        let of_legs = DMatrix::from_fn(n, 6, |i, j| of_legs[i][j]);
-        // First what the others ask for, then what the legs ask for within that; each of least size.
-        let rest = pure_rows(mech, pose, scale);
-        let held = Svd::of(&DMatrix::from_fn(others.len(), 6, |i, j| rest[n + i][j]))?;
-        let (first, rank) = least(&held, &others);
-        let allowed = held.v_t.rows(rank, 6 - rank).transpose();
-        let on_allowed = Svd::of(&(&of_legs * &allowed))?;
-        let (second, _) = least(&on_allowed, &(&legs + &of_legs * &first));
-        let step = first + allowed * second;
-        let left = (&legs + &of_legs * &step).norm_squared();
-        let last = on_allowed.values.len().checked_sub(1)?;
-        let pivots = on_allowed.values[last] / on_allowed.values[0];
-        let size = step.norm();
-        let step = std::array::from_fn(|i| step[i]);
+        let others: Vec<f64> = rows::others(mech).map(off).collect();
+        let regular = room.and_then(|room| by_reflections(mech, pose, &rows, [&legs, &others], room));
+        let (step, pivots) = match regular {
+            Some(found) => found,
+            None => by_singular_values(mech, pose, &rows, [&legs, &others])?,
+        };
+        let missed =
+            |(row, miss): (&[f64; 6], &f64)| miss + row.iter().zip(&step).map(|(a, b)| a * b).sum::<f64>();
+        let left = rows.iter().zip(&legs).map(missed).map(|x| x * x).sum();
+        let size = step.iter().map(|x| x * x).sum::<f64>().sqrt();
         size.is_finite().then_some(Misses { legs, others, step, size, left, pivots })
     }
 
     /// What must fall: the square of what lengths miss, and what constraints miss, not squared, so that they are kept at the
     /// cost of lengths that contradict one another.
     fn merit(&self) -> f64 {
-        self.legs.norm_squared() + self.others.iter().map(|x| x.abs()).sum::<f64>()
+        self.legs.iter().map(|x| x * x).sum::<f64>() + self.others.iter().map(|x| x.abs()).sum::<f64>()
     }
+}
+
+/// The step and the legs' regularity by Householder reflections; none where rows are as good as dependent.
+fn by_reflections(
+    mech: &Mechanism,
+    pose: &Pose<f64>,
+    rows: &[[f64; 6]],
+    [legs, others]: [&[f64]; 2],
+    room: &mut RedundantRows<f64>,
+) -> Option<([f64; 6], f64)> {
+    room.factor_with(mech, pose, rows);
+    let step = room.least_step(legs, others);
+    (room.regular > RANK_TOLERANCE).then_some((step, room.regular))
+}
+
+/// The same by singular values, for rows of any rank.
+fn by_singular_values(
+    mech: &Mechanism,
+    pose: &Pose<f64>,
+    rows: &[[f64; 6]],
+    [legs, others]: [&[f64]; 2],
+) -> Option<([f64; 6], f64)> {
+    let scale = mech.characteristic_length;
+    let (legs, others) = (DVector::from_column_slice(legs), DVector::from_column_slice(others));
+    let of_legs = DMatrix::from_fn(rows.len(), 6, |i, j| rows[i][j]);
+    // First what the others ask for, then what the legs ask for within that; each of least size.
+    let rest: Vec<[f64; 6]> = rows::others(mech).map(|row| row.pure(pose, scale)).collect();
+    let held = Svd::of(&DMatrix::from_fn(others.len(), 6, |i, j| rest[i][j]))?;
+    let (first, rank) = least(&held, &others);
+    let allowed = held.v_t.rows(rank, 6 - rank).transpose();
+    let on_allowed = Svd::of(&(&of_legs * &allowed))?;
+    let (second, _) = least(&on_allowed, &(&legs + &of_legs * &first));
+    let step = first + allowed * second;
+    let last = on_allowed.values.len().checked_sub(1)?;
+    Some((std::array::from_fn(|i| step[i]), on_allowed.values[last] / on_allowed.values[0]))
 }
 
 /// The least x for which `m x = -b` in the sense of least squares, and the rank of m.
@@ -121,13 +156,14 @@ pub fn forward_kinematics(mech: &Mechanism, lengths: &[f64], guess: &Pose<f64>) 
     }
     let lost = Found { status: Status::NotConverged, ..nothing };
     let asked: Vec<Asked<f64>> = asked_of_all(mech, lengths).collect();
-    let Some(mut at) = Misses::at(mech, &asked, guess) else { return lost };
+    let mut room = (mech.mobility.uncontrolled == 0).then(|| RedundantRows::new(mech));
+    let Some(mut at) = Misses::at(mech, &asked, guess, room.as_mut()) else { return lost };
     let (mut pose, mut share, mut iterations) = (*guess, 1.0_f64, 0);
     while at.size > ROUNDING && iterations < STEPS {
         iterations += 1;
         share = share.min(LONGEST_STEP / at.size);
         let next = pose.stepped(&step_of(mech, at.step, share));
-        let trial = Misses::at(mech, &asked, &next);
+        let trial = Misses::at(mech, &asked, &next, room.as_mut());
         let near = at.size <= NEAR;
         let promised = 0.1 * share * (at.merit() - at.left).max(0.0);
         match trial {
@@ -145,7 +181,7 @@ pub fn forward_kinematics(mech: &Mechanism, lengths: &[f64], guess: &Pose<f64>) 
             break;
         }
     }
-    let met = at.legs.amax() <= AGREEMENT && at.others.iter().all(|x| x.abs() <= KEPT);
+    let met = at.legs.iter().all(|x| x.abs() <= AGREEMENT) && at.others.iter().all(|x| x.abs() <= KEPT);
     let status = match (met, at.size <= NEAR) {
         (true, _) if mech.mobility.uncontrolled > 0 || !(at.pivots > FOLD_PIVOTS) => Status::Singular,
         (true, _) => Status::Ok,

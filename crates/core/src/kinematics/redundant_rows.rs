@@ -80,6 +80,24 @@ impl<V: Lanes> RedundantRows<V> {
         V::apart(Factor { rows: self, mech, pose });
     }
 
+    /// The same with given rows of the legs, in pure numbers.
+    pub(crate) fn factor_with(&mut self, mech: &Mechanism, pose: &Pose<V>, legs: &[[V; 6]]) {
+        self.legs.copy_from_slice(legs);
+        self.set_others(mech, pose);
+        self.factor_set();
+    }
+
+    /// The least step (v/Λ, ω) that takes off what the others miss and, within that, most of what legs miss in the sense of
+    /// least squares; all in pure numbers, lengths and values divided by Λ.
+    pub(crate) fn least_step(&mut self, legs: &[V], others: &[V]) -> [V; 6] {
+        let mut rates = [V::zero(); 6];
+        for (k, miss) in others.iter().enumerate() {
+            rates[k] = -miss.scale(1.0 / self.units[self.numbers[k]]);
+        }
+        self.solve(Wrench::zero(), legs, &rates[..others.len()]);
+        Twist::new(self.motion.v, self.motion.omega.scale(self.scale)).array()
+    }
+
     /// Solves `f - A y = preferred`, `Aᵀ f + Cᵀ λ = w`, `C y = rates`, in SI units; none for zeros. So f are the forces
     /// nearest to the preferred ones that balance -w \[T72\]; with w zero, y is the twist of least squares for rates of the
     /// legs that are minus the preferred forces \[T73\].
@@ -157,21 +175,25 @@ impl<V: Lanes> Work<V> for Factor<'_, V> {
     #[inline(always)]
     fn run(self) {
         let Factor { rows, mech, pose } = self;
-        let scale = rows.scale;
         for (row, (_, leg)) in rows.legs.iter_mut().zip(mech.actuated()) {
-            *row = Row::Leg(leg).pure(pose, scale);
+            *row = Row::Leg(leg).pure(pose, rows.scale);
         }
-        for (k, c) in mech.independent.iter().enumerate() {
-            rows.others.set_row(k, &Row::Constraint(c).pure(pose, scale));
-        }
-        for (k, idle) in mech.idle.iter().enumerate() {
-            rows.others.set_row(mech.independent.len() + k, &Row::Idle(idle).pure(pose, scale));
-        }
+        rows.set_others(mech, pose);
         rows.factor_set();
     }
 }
 
 impl<V: Lanes> RedundantRows<V> {
+    #[inline(always)]
+    fn set_others(&mut self, mech: &Mechanism, pose: &Pose<V>) {
+        for (k, c) in mech.independent.iter().enumerate() {
+            self.others.set_row(k, &Row::Constraint(c).pure(pose, self.scale));
+        }
+        for (k, idle) in mech.idle.iter().enumerate() {
+            self.others.set_row(mech.independent.len() + k, &Row::Idle(idle).pure(pose, self.scale));
+        }
+    }
+
     /// Factors the rows that are set.
     #[inline(always)]
     fn factor_set(&mut self) {
