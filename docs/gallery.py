@@ -20,7 +20,7 @@ from skimage.measure import marching_cubes
 
 import polypod as pp
 from polypod.plots import plot_fig4, plot_mechanism, plot_poses, plot_topology, plot_workspace
-from polypod.style import BLUE, GREY, INK, PALE, SKY, VERMILION, color_of, dash_of, house_style
+from polypod.plots.style import BLUE, GREY, INK, PALE, SKY, VERMILION, color_of, dash_of, house_style
 
 Array = NDArray[np.float64]
 

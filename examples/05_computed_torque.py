@@ -5,7 +5,7 @@ import numpy as np
 
 import polypod as pp
 from polypod.plots import save_figure
-from polypod.style import color_of, dash_of, house_style
+from polypod.plots.style import color_of, dash_of, house_style
 
 # 1. The mechanism and what it is to follow: the first second of the built-in motion.
 mech = pp.load("lu-3spu-2rpu-r")

@@ -196,7 +196,7 @@ def test_solve_without_any_answer(run, tmp_path):
 
 
 def test_long_work_is_solved_in_parts(run, tmp_path, monkeypatch):
-    monkeypatch.setattr("polypod.solution.CHUNK", 100)
+    monkeypatch.setattr("polypod.solution.solve.CHUNK", 100)
     status, _, err = run("solve", NAME, NAME, "-o", tmp_path / "r.nc")
     assert (status, err) == (0, "")  # not on a terminal: no bar
 

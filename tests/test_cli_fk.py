@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import polypod as pp
-from polypod.lengths import load_lengths
+from polypod.solution.poses_of_lengths import load_lengths
 
 NAME = "lu-3spu-2rpu-r"
 DATA = Path(__file__).parent / "data"

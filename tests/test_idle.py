@@ -427,7 +427,7 @@ def test_regressor_and_base_parameters(name: str) -> None:
 
 
 def test_lattices_and_computed_torque_are_refused() -> None:
-    from polypod.control import ComputedTorque
+    from polypod.solution.computed_torque import ComputedTorque
 
     mech = MECHANISMS["pentapod-5-ups"]
     with pytest.raises(UnsupportedError, match="spin"):

@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 
 import polypod as pp
-from polypod.answers import Answer
+from polypod.answers.kinematics import Answer
+from polypod.answers.notebook import MOST_NUMBERS, MOST_ROWS, numbers, rows_of
+from polypod.answers.variables import FURTHER, VARIABLES, variable
 from polypod.errors import ShapeError
-from polypod.notebook import MOST_NUMBERS, MOST_ROWS, numbers, rows_of
-from polypod.solution import states_along
-from polypod.variables import FURTHER, VARIABLES, variable
+from polypod.solution.solve import states_along
 
 DATA = Path(__file__).parent / "data"
 MECHANISMS = {"lu-3spu-2rpu-r": "lu-3spu-2rpu-r"} | {file.stem: file for file in DATA.glob("*.toml")}

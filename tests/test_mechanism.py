@@ -15,7 +15,7 @@ import tomli_w
 
 import polypod as pp
 from polypod.errors import MechanismError, UnknownNameError
-from polypod.units import from_si, to_si
+from polypod.files.units import from_si, to_si
 
 ROOT = Path(__file__).parents[1]
 BUILT_IN = "lu-3spu-2rpu-r"

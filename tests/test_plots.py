@@ -17,8 +17,8 @@ from matplotlib.figure import Figure
 import polypod as pp
 from polypod import plots
 from polypod.errors import PolypodError, ShapeError
-from polypod.scene import Scene
-from polypod.style import PALETTE
+from polypod.plots.scene import Scene
+from polypod.plots.style import PALETTE
 
 NAME = "lu-3spu-2rpu-r"
 FILES = [NAME, *sorted(str(path) for path in (Path(__file__).parent / "data").glob("*.toml"))]

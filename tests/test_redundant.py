@@ -536,7 +536,7 @@ def test_a_lattice_of_lengths_is_refused() -> None:
 
 def test_computed_torque_is_refused() -> None:
     mech = MECHANISMS["4-rpr"]
-    from polypod.control import ComputedTorque
+    from polypod.solution.computed_torque import ComputedTorque
 
     with pytest.raises(UnsupportedError, match="redundant legs"):
         ComputedTorque(mech, None, frequency=10.0)  # type: ignore[arg-type]

@@ -13,13 +13,13 @@ import numpy as np
 import pytest
 
 import polypod as pp
-from polypod.actuators import leg_power, requirements, rms_over_time
 from polypod.report.decimate import POINTS, kept, spans
 from polypod.report.formulas import to_html
 from polypod.report.reactions import reactions_along, reactions_table
-from polypod.solution import CHUNK
-from polypod.summary import summarise
-from polypod.tables import fixed
+from polypod.solution.actuator_sizing import leg_power, requirements, rms_over_time
+from polypod.solution.solve import CHUNK
+from polypod.summary.facts import summarise
+from polypod.summary.tables import fixed
 
 NAME = "lu-3spu-2rpu-r"
 ROOT = Path(__file__).parents[1]

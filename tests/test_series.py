@@ -19,8 +19,8 @@ from matplotlib.figure import Figure
 import polypod as pp
 from polypod import plots
 from polypod.errors import PolypodError, UnknownNameError, WorkspaceError
-from polypod.series import math_symbols, math_unit
-from polypod.style import PALETTE
+from polypod.plots.series import math_symbols, math_unit
+from polypod.plots.style import PALETTE
 
 NAME = "lu-3spu-2rpu-r"
 

@@ -14,7 +14,7 @@ import polypod as pp
 from polypod.multibody.placement import BASE, PLATFORM, inverse
 from polypod.multibody.tree import depth_first, describe, joint_values, release
 from polypod.verify import table, verify, verify_states
-from polypod.verify.report import as_markdown
+from polypod.verify.verdict import as_markdown
 
 pin = pytest.importorskip("pinocchio")
 

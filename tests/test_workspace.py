@@ -12,9 +12,9 @@ import trimesh
 from scipy import ndimage
 
 import polypod as pp
-from polypod.boundary import Cuts, coarsened, content, content_with_error, open_edges, surface
-from polypod.section4 import PRINTED, section4, widths_above
-from polypod.workspace import EDGE_OF_GRID, NO_POSE, SINGULARITY
+from polypod.paper.section4 import PRINTED, section4, widths_above
+from polypod.workspaces.boundary import Cuts, coarsened, content, content_with_error, open_edges, surface
+from polypod.workspaces.workspace import EDGE_OF_GRID, NO_POSE, SINGULARITY
 
 NAME = "lu-3spu-2rpu-r"
 DATA = Path(__file__).parent / "data"
@@ -470,7 +470,7 @@ def test_scenes_load_back(reachable, tmp_path):
 
 
 def test_scenes_are_for_positions(tmp_path):
-    from polypod.workspace import check_suffix
+    from polypod.workspaces.workspace import check_suffix
 
     check_suffix(tmp_path / "w.glb", ["x", "y", "z"])
     with pytest.raises(pp.WorkspaceError, match="not z, alpha, beta"):

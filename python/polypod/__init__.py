@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 from polypod import compute, errors
 from polypod._core import __version__
+from polypod.answers.singularity import SingularityKind
+from polypod.answers.status import Status
 from polypod.errors import (
     CoordinateError,
     ExportError,
@@ -25,29 +27,27 @@ from polypod.errors import (
     WorkspaceError,
 )
 from polypod.mechanism import Mechanism, list_mechanisms, load
-from polypod.singularity import SingularityKind
-from polypod.status import Status
 
 if TYPE_CHECKING:
-    from polypod.control import ComputedTorque
-    from polypod.motion import Motion, load_motion
+    from polypod.motion.motion import Motion, load_motion
     from polypod.report import report_html, write_report
-    from polypod.results import Solution, load_solution
-    from polypod.solution import solve
-    from polypod.workspace import Workspace, load_workspace
+    from polypod.solution.computed_torque import ComputedTorque
+    from polypod.solution.solution import Solution, load_solution
+    from polypod.solution.solve import solve
+    from polypod.workspaces.workspace import Workspace, load_workspace
 
 compute.configure()
 
 # Motions and results need scipy and xarray, which take their time to load: only who uses them waits for them.
 _LATER = {
-    "ComputedTorque": "control",
-    "Motion": "motion",
-    "load_motion": "motion",
-    "Solution": "results",
-    "load_solution": "results",
-    "solve": "solution",
-    "Workspace": "workspace",
-    "load_workspace": "workspace",
+    "ComputedTorque": "solution.computed_torque",
+    "Motion": "motion.motion",
+    "load_motion": "motion.motion",
+    "Solution": "solution.solution",
+    "load_solution": "solution.solution",
+    "solve": "solution.solve",
+    "Workspace": "workspaces.workspace",
+    "load_workspace": "workspaces.workspace",
     "plots": "plots",
     "report_html": "report",
     "write_report": "report",

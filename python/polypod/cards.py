@@ -7,18 +7,18 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from polypod.drives import word
-from polypod.notebook import Rows, card, counted, number, numbers, outcomes, rows_of
-from polypod.status import Status
-from polypod.units import coordinate_unit, readable
+from polypod.answers.notebook import Rows, card, counted, number, numbers, outcomes, rows_of
+from polypod.answers.status import Status
+from polypod.files.units import coordinate_unit, readable
+from polypod.summary.leg_words import word
 
 if TYPE_CHECKING:
-    from polypod.answers import Mobility
-    from polypod.lattice import LengthLattice
+    from polypod.answers.kinematics import Mobility
     from polypod.mechanism import Mechanism
-    from polypod.motion import Motion
-    from polypod.results import Solution
-    from polypod.workspace import Workspace
+    from polypod.motion.motion import Motion
+    from polypod.solution.solution import Solution
+    from polypod.workspaces.length_lattice import LengthLattice
+    from polypod.workspaces.workspace import Workspace
 
 OF_LEGS = ("length", "rate", "force")
 OF_STATES = ("actuator_power", "power_residual", "sigma_min", "condition")
@@ -58,7 +58,7 @@ def _drawing(mech: Mechanism) -> bytes:
     from matplotlib.figure import Figure
 
     from polypod.plots import plot_mechanism
-    from polypod.style import house_style
+    from polypod.plots.style import house_style
 
     figure, file = Figure(figsize=(3.2, 3.4)), io.BytesIO()
     plot_mechanism(mech, ax=figure.add_axes((0.0, 0.0, 1.0, 1.0), projection="3d"), labels=False)
@@ -109,7 +109,7 @@ def solution_heading(solution: Solution) -> tuple[str, str]:
 
 def of_solution(solution: Solution) -> str:
     """Outcomes, legs, power and conditioning; how a simulation ended; singularities that are passed."""
-    from polypod.passages import warnings_of
+    from polypod.solution.singularity_crossings import warnings_of
 
     data, notes = solution.dataset, []
     if solution.end:

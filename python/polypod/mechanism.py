@@ -16,7 +16,8 @@ import tomli_w
 from numpy.typing import ArrayLike, NDArray
 
 from polypod import _core
-from polypod.answers import (
+from polypod.answers.derivatives import BaseParameters, InverseDynamicsDerivatives, Regressor
+from polypod.answers.kinematics import (
     AssemblyModes,
     Conditioning,
     CoupledForces,
@@ -40,8 +41,18 @@ from polypod.answers import (
     Published,
     State,
 )
+from polypod.answers.screws import Screws, constraint_screws, freedom_screws
+from polypod.answers.singularity import (
+    NEAR_SINGULAR,
+    TOLERANCE,
+    Determinant,
+    Singularity,
+    SingularityDistance,
+    SingularityKind,
+    codes,
+)
+from polypod.answers.status import Status
 from polypod.arrays import MOTION, MOVING, POSE, Arguments, Array, Loaded, common, doubles, spread
-from polypod.derivatives import BaseParameters, InverseDynamicsDerivatives, Regressor
 from polypod.errors import (
     CoordinateError,
     Fault,
@@ -52,26 +63,15 @@ from polypod.errors import (
     WorkspaceError,
     alternatives,
 )
-from polypod.lines import line_of, read_toml
-from polypod.schema import read_spec
-from polypod.screws import Screws, constraint_screws, freedom_screws
-from polypod.singularity import (
-    NEAR_SINGULAR,
-    TOLERANCE,
-    Determinant,
-    Singularity,
-    SingularityDistance,
-    SingularityKind,
-    codes,
-)
-from polypod.status import Status
-from polypod.units import readable
+from polypod.files.mechanism_schema import read_spec
+from polypod.files.toml_lines import line_of, read_toml
+from polypod.files.units import readable
 
 if TYPE_CHECKING:
-    from polypod.lattice import LengthLattice
-    from polypod.results import Solution
-    from polypod.simulation import Input
-    from polypod.workspace import Workspace
+    from polypod.solution.simulate import Input
+    from polypod.solution.solution import Solution
+    from polypod.workspaces.length_lattice import LengthLattice
+    from polypod.workspaces.workspace import Workspace
 
 _AT_REST = np.empty(0)
 """Twists or accelerations of states that are all at rest."""
@@ -619,7 +619,7 @@ class Mechanism:
         """
         set, named = self._varied_coordinates(set, coordinates)
         if reach is None:
-            from polypod.drives import spans
+            from polypod.summary.leg_words import spans
 
             reach = float(spans(self).max())
         (poses,) = POSE(pose)
@@ -787,8 +787,8 @@ class Mechanism:
         >>> tilts.mask.shape
         (63, 31)
         """
-        from polypod.reachable import reachable
-        from polypod.slices import sliced
+        from polypod.workspaces.reachable import reachable
+        from polypod.workspaces.slices import sliced
 
         given: dict[str, Any] = {
             "step": step,
@@ -835,7 +835,7 @@ class Mechanism:
             UnsupportedError: an actuated leg without a stroke, or not as many of them as freedoms.
             WorkspaceError: a step or start that is wrong.
         """
-        from polypod.lattice import length_lattice
+        from polypod.workspaces.length_lattice import length_lattice
 
         return length_lattice(
             self,
@@ -1064,7 +1064,7 @@ class Mechanism:
         >>> fall.end["kind"], round(fall.end["time"], 3), fall.end["reason"]
         ('limit', 0.083, 'stroke max of leg 3')
         """
-        from polypod.simulation import simulate
+        from polypod.solution.simulate import simulate
 
         return simulate(
             self,

@@ -64,12 +64,12 @@ def simulate(
 
     It ends at the first limit or singularity. The exit status is 1 if it ends without an answer.
     """
-    from polypod.control import ComputedTorque
+    from polypod.cli.quantities import named
     from polypod.mechanism import load
-    from polypod.motion import load_motion
-    from polypod.quantities import named
-    from polypod.simulation import STOPS
-    from polypod.summary import summarise
+    from polypod.motion.motion import load_motion
+    from polypod.solution.computed_torque import ComputedTorque
+    from polypod.solution.simulate import STOPS
+    from polypod.summary.facts import summarise
 
     check_result_path(result, mechanism)
     mech = load(mechanism)

@@ -91,8 +91,8 @@ def workspace(
 
     Values without a unit are in m and rad.
     """
+    from polypod.cli.quantities import interval, named, names_of, steps_of
     from polypod.mechanism import load
-    from polypod.quantities import interval, named, names_of, steps_of
 
     names = None if vary is None else names_of(vary)
     kind = kind or (Kind.SLICE if names else Kind.REACHABLE)
@@ -154,7 +154,7 @@ def _check_workspace_options(
     keep_aspect: bool,
 ) -> None:
     """Before any work: options that do not go together, and files that could not be written after it."""
-    from polypod.workspace import check_suffix
+    from polypod.workspaces.workspace import check_suffix
 
     if kind is Kind.SLICE and not names:
         raise WorkspaceError("--kind slice needs --vary, such as --vary x,y,z")
@@ -179,8 +179,8 @@ def _check_workspace_options(
 
 
 def _print_workspace(out: Console, facts: dict[str, Any]) -> None:
-    from polypod.tables import ends_table, extents_table
-    from polypod.units import coordinate_unit, readable
+    from polypod.files.units import coordinate_unit, readable
+    from polypod.summary.tables import ends_table, extents_table
 
     fixed = ", ".join(
         f"{name} = {readable(value, coordinate_unit(name))}" for name, value in facts.get("fixed", {}).items()
@@ -198,7 +198,7 @@ def _print_workspace(out: Console, facts: dict[str, Any]) -> None:
 
 
 def _print_lattice(out: Console, facts: dict[str, Any]) -> None:
-    from polypod.units import readable
+    from polypod.files.units import readable
 
     out.print(
         f"[bold]{escape(facts['mechanism'])}[/bold]: lattice of leg lengths, steps of "

@@ -16,7 +16,7 @@ import trimesh
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from polypod.bodies import Link, Piece, link_frames, links_of
+from polypod.bodies.links import Link, Piece, link_frames, links_of
 from polypod.errors import ExportError
 from polypod.mechanism import Mechanism
 from polypod.multibody.placement import inverse

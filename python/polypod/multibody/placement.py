@@ -13,7 +13,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from polypod.schema import SLIDER_LINKS, TELESCOPE_LINKS
+from polypod.files.mechanism_schema import SLIDER_LINKS, TELESCOPE_LINKS
 
 Array = NDArray[np.float64]
 Placements = dict[str, Array]

@@ -15,8 +15,6 @@ from markdown_it import MarkdownIt
 from markupsafe import Markup
 from plotly.offline import get_plotlyjs
 
-from polypod import tables
-from polypod.drives import links_of_leg
 from polypod.mechanism import Mechanism
 from polypod.report import figures, groups
 from polypod.report.charts import Chart, Series
@@ -27,8 +25,10 @@ from polypod.report.inputs import MotionSource, versions
 from polypod.report.reactions import reactions_table
 from polypod.report.space import workspace_figure
 from polypod.report.words import actuators_table, glance, outcomes, warnings, workspace_words
-from polypod.results import replacing
-from polypod.workspace import Workspace
+from polypod.solution.solution import replacing
+from polypod.summary import tables
+from polypod.summary.leg_words import links_of_leg
+from polypod.workspaces.workspace import Workspace
 
 
 def report_html(

@@ -16,11 +16,11 @@ from exudyn import itemInterface as items
 from exudyn.rigidBodyUtilities import AngularVelocity2EulerParameters_t, RotationMatrix2EulerParameters
 from numpy.typing import NDArray
 
+from polypod.answers.status import Status
 from polypod.multibody.placement import BASE, PLATFORM, Placements, across, cross
 from polypod.multibody.tree import POINT, Body, Multibody, Y
-from polypod.status import Status
-from polypod.verify.forced import Forced, inertial
-from polypod.verify.rows import Row, Slide, Start
+from polypod.verify.constraints import Row, Slide, Start
+from polypod.verify.twin import Forced, inertial
 
 Array = NDArray[np.float64]
 Drive = Callable[[float], tuple[Array, Array]]

@@ -13,9 +13,9 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from polypod.answers.status import Status
 from polypod.multibody.placement import BASE, PLATFORM, Placements, cross, inverse
 from polypod.multibody.tree import Body, Freedom, Multibody, joint_values, release
-from polypod.status import Status
 
 Array = NDArray[np.float64]
 

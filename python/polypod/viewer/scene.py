@@ -9,13 +9,13 @@ import trimesh
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from polypod.bodies import PLATFORM, STEEL, Link, leg_radii
+from polypod.answers.singularity import NEAR_SINGULAR
+from polypod.bodies.links import PLATFORM, STEEL, Link, leg_radii
+from polypod.bodies.rails import way
 from polypod.mechanism import Mechanism
-from polypod.rails import way
-from polypod.singularity import NEAR_SINGULAR
-from polypod.style import SKY, YELLOW
-from polypod.viewer.state import Level, Model, View
-from polypod.workspace import Workspace
+from polypod.plots.style import SKY, YELLOW
+from polypod.viewer.model import Level, Model, View
+from polypod.workspaces.workspace import Workspace
 
 if TYPE_CHECKING:
     import viser
