@@ -18,9 +18,9 @@ from scipy.io import loadmat
 import polypod as pp
 from polypod.bodies.links import link_frames, links_of
 from polypod.export import FORMATS, export
-from polypod.export.gltf import Y_UP
 from polypod.export.model import LIGHT, THIN, Model
 from polypod.export.names import Names, legal
+from polypod.files.glb import Y_UP
 from polypod.solution.solve import states_along
 
 sys.path.insert(0, str(Path(__file__).parent))

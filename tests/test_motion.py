@@ -13,7 +13,8 @@ import tomli_w
 from numpy.polynomial import Polynomial
 
 from polypod.errors import MotionError, ShapeError, UnknownNameError
-from polypod.motion.motion import Array, Motion, load_motion, minimum_jerk, quintic
+from polypod.motion.motion import Array, Motion, minimum_jerk, quintic
+from polypod.motion.motion_file import load_motion
 
 SETS = {
     "paper": ("x", "y", "z", "alpha", "beta"),

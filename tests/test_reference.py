@@ -116,7 +116,7 @@ RECORDS = {
     name: thing
     for name, thing in documented().items()
     if dataclasses.is_dataclass(thing)
-    and (issubclass(thing, Answer) or thing.__module__ == "polypod.answers.kinematics")
+    and (issubclass(thing, Answer) or thing.__module__.startswith("polypod.answers."))
 }
 ANSWERS = {name: kind for name, kind in RECORDS.items() if issubclass(kind, Answer) and kind is not Answer}
 

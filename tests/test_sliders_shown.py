@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 import polypod as pp
+from polypod.answers import leg_words
 from polypod.bodies.links import link_frames, links_of
 from polypod.plots import _topology_places, fig4_panels
 from polypod.plots.scene import Scene
 from polypod.report.data import data_tables
 from polypod.report.words import actuators_table
-from polypod.summary import leg_words
 from polypod.summary.facts import describe, summarise
 from polypod.summary.tables import legs_table, motion_table
 
@@ -193,7 +193,7 @@ def test_the_workspace_of_a_slider_is_bounded_by_its_rail():
     assert np.isfinite(box).all()
     # The rails lie in a plane, and home is above it.
     assert box[2, 0] == 0.0
-    found = pp.load("hexaglide").workspace(step=0.15)
+    found = pp.workspace(pp.load("hexaglide"), step=0.15)
     assert found.volume > 0.0
     inside = found.vertices
     assert np.all((inside > box[:, 0] - 0.15) & (inside < box[:, 1] + 0.15))
@@ -201,7 +201,7 @@ def test_the_workspace_of_a_slider_is_bounded_by_its_rail():
 
 def test_a_lattice_of_lengths_is_of_telescopic_legs():
     with pytest.raises(pp.UnsupportedError, match="legs 1, 2, 3 are sliders"):
-        pp.load("3-prs").length_lattice(step=0.04)
+        pp.length_lattice(pp.load("3-prs"), step=0.04)
 
 
 def test_datasets_say_what_they_hold():

@@ -11,13 +11,23 @@ from numpy.typing import NDArray
 
 from polypod.answers.notebook import Rows, card, counted, numbers, outcomes, rows_of
 from polypod.answers.status import Status
-from polypod.answers.variables import DIMENSIONS, HALVES, POSE, Variable, attributes_of, coords_of, variable
+from polypod.answers.variables import (
+    DIMENSIONS,
+    HALVES,
+    POSE,
+    HasParts,
+    Variable,
+    attributes_of,
+    coords_of,
+    variable,
+)
 from polypod.errors import ShapeError
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from polypod.mechanism import Mechanism
+Array = NDArray[np.float64]
+Codes = NDArray[np.uint8]
 
 
 class Quantity(NamedTuple):
@@ -70,7 +80,7 @@ class Answer:
     Subclasses are dataclasses; they say in `_variables` which quantity each of their arrays is.
     """
 
-    mech: Mechanism
+    mech: HasParts
     """The mechanism that was asked."""
 
     _variables: ClassVar[dict[str, str]]

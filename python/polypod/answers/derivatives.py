@@ -12,10 +12,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from polypod.answers.answer import Answer
-
-Array = NDArray[np.float64]
-Codes = NDArray[np.uint8]
+from polypod.answers.answer import Answer, Array, Codes
 
 
 @dataclass(eq=False, repr=False)

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import base64
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from enum import IntEnum
 from functools import cache
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -33,6 +33,26 @@ src="data:image/png;base64,{{ picture }}">
 {% endfor %}</tbody></table>
 {% if table.left_out %}<div style="opacity: .75; font-size: 90%">… and {{ table.left_out }} more</div>
 {% endif %}{% endfor %}</div>"""
+
+
+Shown = TypeVar("Shown")
+
+_DRAWN_BY: dict[type, Callable[[Any], bytes]] = {}
+"""What draws the picture on a card, by the type of what the card shows."""
+
+
+def draw_with(kind: type[Shown], draw: Callable[[Shown], bytes]) -> None:
+    """Cards of such things get a picture, which `draw` makes as a PNG file when a card is shown.
+
+    So the rooms of figures, which know mechanisms, need not be known to mechanisms.
+    """
+    _DRAWN_BY[kind] = draw
+
+
+def picture_of(thing: object) -> bytes | None:
+    """The picture for the card of a thing, or None where nothing draws such things."""
+    draw = _DRAWN_BY.get(type(thing))
+    return None if draw is None else draw(thing)
 
 
 class Rows(NamedTuple):

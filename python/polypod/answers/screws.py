@@ -3,16 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from polypod.answers.status import Status
-from polypod.arrays import doubles
-
-if TYPE_CHECKING:
-    from polypod.mechanism import Mechanism
 
 Array = NDArray[np.float64]
 Row = tuple[list[float], list[float], float, list[float]]
@@ -34,27 +30,11 @@ class Screws:
     status: int
     """Why there are none, a `Status`."""
 
-
-def freedom_screws(mech: Mechanism, pose: ArrayLike) -> Screws:
-    """See `Mechanism.freedom_screws`."""
-    matrix, status = _known(mech, pose)
-    return _screws(mech._core.freedom_screws(matrix) if status is Status.OK else [], status)
-
-
-def constraint_screws(mech: Mechanism, pose: ArrayLike) -> Screws:
-    """See `Mechanism.constraint_screws`."""
-    matrix, status = _known(mech, pose)
-    return _screws(mech._core.constraint_screws(matrix) if status is Status.OK else [], status)
-
-
-def _known(mech: Mechanism, pose: ArrayLike) -> tuple[Array, Status]:
-    """A pose, and whether it is one where every leg has a direction."""
-    matrix = doubles("pose", pose, (4, 4), batch=False)
-    return matrix, Status(int(mech.singularity(matrix).status))
-
-
-def _screws(rows: list[Row] | None, status: Status) -> Screws:
-    if rows is None:
-        rows, status = [], Status.SINGULAR
-    table = np.array([[*vector, *axis, pitch, *point] for vector, axis, pitch, point in rows]).reshape(-1, 13)
-    return Screws(table[:, :6], table[:, 6:9], table[:, 9], table[:, 10:], int(status))
+    @classmethod
+    def of(cls, rows: list[Row] | None, status: Status) -> Self:
+        """Those of the core's rows (vector, axis, pitch, point); SINGULAR where it has none."""
+        if rows is None:
+            rows, status = [], Status.SINGULAR
+        table = np.array([[*vector, *axis, pitch, *point] for vector, axis, pitch, point in rows])
+        table = table.reshape(-1, 13)
+        return cls(table[:, :6], table[:, 6:9], table[:, 9], table[:, 10:], int(status))

@@ -9,11 +9,9 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from polypod.answers.answer import Answer
+from polypod.answers.answer import Answer, Array, Codes
 from polypod.answers.singularity_kind import SingularityKind as SingularityKind
 
-Array = NDArray[np.float64]
-Codes = NDArray[np.uint8]
 Kinds = NDArray[np.int8]
 
 TOLERANCE = 1e-6

@@ -7,17 +7,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from enum import IntEnum
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
+import numpy as np
+from numpy.typing import NDArray
+
+from polypod.answers.mobility import Mobility
+from polypod.answers.parts import Joint, Limit
 from polypod.answers.singularity_kind import SingularityKind
 from polypod.answers.status import Status
 from polypod.files.units import coordinate_unit
-
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
-    from polypod.mechanism import Mechanism
 
 Dims = tuple[str, ...]
 
@@ -31,6 +30,33 @@ _LEG3, _ROD3, _SIX, _PAIR = ("leg", "axis"), ("rod", "axis"), ("component",), ("
 _JOINT, _JOINT_AXES = ("joint", "component"), ("joint", "joint_component")
 _ROW = ("constraint_row",)
 _MODE, _COORDINATE, _SIDES = ("mode",), ("coordinate",), ("coordinate", "side")
+
+
+class HasParts(Protocol):
+    """What answers need of a mechanism: the names of its parts."""
+
+    name: str
+    leg_names: tuple[str, ...]
+    rod_names: tuple[str, ...]
+
+    @property
+    def sliders(self) -> NDArray[np.bool_]:
+        """(n,): which legs slide on a rail."""
+
+    @property
+    def coupled_legs(self) -> tuple[str, str] | None:
+        """The two legs on one rod that share a constraint, or None."""
+
+    @property
+    def joint_list(self) -> tuple[Joint, ...]:
+        """All joints."""
+
+    @property
+    def limit_list(self) -> tuple[Limit, ...]:
+        """All limits that the file sets."""
+
+    def mobility(self) -> Mobility:
+        """Freedoms, constraints and the topology graph."""
 
 
 class Variable(NamedTuple):
@@ -274,7 +300,7 @@ def attributes_of(name: str, about: Variable, sliders: NDArray[np.bool_]) -> dic
 
 _XYZ = ("x", "y", "z")
 COMPONENTS = ("linear x", "linear y", "linear z", "angular x", "angular y", "angular z")
-_LABELS: dict[str, Callable[[Mechanism], Sequence[Any]]] = {
+_LABELS: dict[str, Callable[[HasParts], Sequence[Any]]] = {
     "leg": lambda mech: mech.leg_names,
     "axis": lambda mech: _XYZ,
     "component": lambda mech: COMPONENTS,
@@ -301,14 +327,14 @@ def _unit_along(name: str) -> str:
     return "m" if name.startswith("linear") else coordinate_unit(name)
 
 
-def constraint_rows(mech: Mechanism) -> list[str]:
+def constraint_rows(mech: HasParts) -> list[str]:
     """Names of the independent constraints, such as "A of leg 1"."""
     mobility = mech.mobility()
     rows = [mobility.constraint_rows[i] for i in mobility.independent_rows]
     return [f"{kind} of leg {leg}" for leg, kind in rows]
 
 
-def coords_of(mech: Mechanism, dims: set[str], own: Mapping[str, Sequence[Any]]) -> dict[str, Any]:
+def coords_of(mech: HasParts, dims: set[str], own: Mapping[str, Sequence[Any]]) -> dict[str, Any]:
     """The labels along dimensions as coordinates of a dataset; `own` are those that no mechanism knows."""
     labels = {dim: list(of(mech)) for dim, of in _LABELS.items() if dim in dims and dim not in own}
     labels |= {dim: list(names) for dim, names in own.items() if dim in dims}

@@ -14,11 +14,12 @@ import trimesh
 from numpy.typing import ArrayLike, NDArray
 from trimesh import Trimesh
 
-from polypod.answers.kinematics import Codes, InverseKinematics
+from polypod.answers.answer import Codes
+from polypod.answers.kinematics import InverseKinematics
+from polypod.bodies.palette import PALE, color_of
 from polypod.bodies.rails import Rail, behind, flat_normal, lower_ends, unit, way
 from polypod.bodies.solids import across, ball, block, lathe, plate, tube
 from polypod.mechanism import Mechanism
-from polypod.plots.style import PALE, color_of
 
 Array = NDArray[np.float64]
 LinkKind = Literal["base", "rod", "cylinder", "piston", "carriage", "strut", "platform"]

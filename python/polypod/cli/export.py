@@ -87,7 +87,7 @@ def export(
     from polypod.export.formats import FORMATS, format_of
     from polypod.export.formats import export as write
     from polypod.mechanism import load
-    from polypod.motion.motion import load_motion
+    from polypod.motion.motion_file import load_motion
 
     name = format_of(output, None if to is None else to.value)
     suffixes = FORMATS[name].suffixes if to is None else (output.suffix,)

@@ -54,7 +54,7 @@ def solve(
     import numpy as np
 
     from polypod.mechanism import load
-    from polypod.motion.motion import load_motion
+    from polypod.motion.motion_file import load_motion
     from polypod.summary.facts import summarise
 
     check_result_path(result, mechanism, motion)

@@ -58,7 +58,7 @@ def verify(
     import numpy as np
 
     from polypod.mechanism import load
-    from polypod.motion.motion import load_motion
+    from polypod.motion.motion_file import load_motion
     from polypod.verify import TOLERANCE, integrate
     from polypod.verify import verify as verify_motion
 

@@ -93,6 +93,8 @@ def workspace(
     """
     from polypod.cli.quantities import interval, named, names_of, steps_of
     from polypod.mechanism import load
+    from polypod.workspaces.length_lattice import length_lattice
+    from polypod.workspaces.search import workspace as find
 
     names = None if vary is None else names_of(vary)
     kind = kind or (Kind.SLICE if names else Kind.REACHABLE)
@@ -105,7 +107,8 @@ def workspace(
                 f"--step: the step of lengths is one number, not one for {next(iter(widths))}"
             )
         with progress_bar("length lattice", 1) as progress:
-            lattice = mech.length_lattice(
+            lattice = length_lattice(
+                mech,
                 step=widths,
                 bounds=dict(interval("--bounds", text) for text in bounds or []),
                 sigma_min=sigma_min,
@@ -115,7 +118,8 @@ def workspace(
         print_json(lattice.facts()) if as_json else _print_lattice(console(), lattice.facts())
         return
     with progress_bar(f"{kind} workspace", 1) as progress:
-        found = mech.workspace(
+        found = find(
+            mech,
             names,
             dict(named("--fix", text) for text in fix or []),
             step=widths,

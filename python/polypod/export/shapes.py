@@ -10,10 +10,10 @@ import trimesh
 from numpy.typing import NDArray
 
 from polypod.bodies.links import Link, leg_radii, links_of
+from polypod.bodies.palette import PALE, color_of
 from polypod.bodies.rails import unit, way
 from polypod.mechanism import Mechanism
 from polypod.multibody.placement import across, leg_bodies, rod_body
-from polypod.plots.style import PALE, color_of
 
 Array = NDArray[np.float64]
 

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from polypod.mechanism import Mechanism
-from polypod.workspaces.length_lattice import LengthLattice
+from polypod.workspaces.length_lattice import LengthLattice, length_lattice
+from polypod.workspaces.search import workspace
 from polypod.workspaces.workspace import Workspace
 
 Array = NDArray[np.float64]
@@ -72,10 +73,10 @@ def section4(
     mech: Mechanism, *, step: float = 0.02, lattice_step: float = 0.02, threads: int = 0
 ) -> Section4:
     """Both workspaces of the paper's manipulator; the paper's own step of lengths is 10 mm."""
-    lattice = mech.length_lattice(step=lattice_step, layer=0.5 * lattice_step, threads=threads)
+    lattice = length_lattice(mech, step=lattice_step, layer=0.5 * lattice_step, threads=threads)
     return Section4(
-        mech.workspace(step=step, threads=threads),
-        mech.workspace(step=step, threads=threads, keep_aspect=True, start=lattice.inputs["start"]),
+        workspace(mech, step=step, threads=threads),
+        workspace(mech, step=step, threads=threads, keep_aspect=True, start=lattice.inputs["start"]),
         lattice,
     )
 

@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from polypod.answers.kinematics import Array, AssemblyModes
+from polypod.answers.answer import Array
+from polypod.answers.kinematics import AssemblyModes
 from polypod.errors import UnsupportedError
 from polypod.files.units import cos_sin, to_si
 from polypod.mechanism import Mechanism

@@ -17,11 +17,11 @@ from numpy.typing import NDArray
 from trimesh import Trimesh
 
 from polypod.bodies.links import JOINT, Link, leg_radii, link_frames, links_of
+from polypod.bodies.palette import INK
 from polypod.bodies.rails import unit
 from polypod.bodies.solids import four_sided, tube
 from polypod.mechanism import Mechanism
 from polypod.plots.canvas import size_of
-from polypod.plots.style import INK
 
 Array = NDArray[np.float64]
 DrawnOut = Callable[[Array], tuple[Array, NDArray[np.bool_]]]

@@ -14,10 +14,11 @@ from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
 from polypod.answers.status import Status
+from polypod.bodies.palette import GREY, PALE, color_of
 from polypod.errors import PolypodError, UnknownNameError
 from polypod.mechanism import Mechanism
 from polypod.plots.canvas import pyplot_figure
-from polypod.plots.style import GREY, PALE, color_of, dash_of, house_style
+from polypod.plots.style import dash_of, house_style
 from polypod.solution.solution import Solution
 
 Array = NDArray[np.float64]

@@ -9,12 +9,7 @@ from typing import Any
 import matplotlib as mpl
 from cycler import cycler
 
-BLUE, ORANGE, GREEN, VERMILION = "#0072B2", "#E69F00", "#009E73", "#D55E00"
-PURPLE, SKY, BLACK, YELLOW = "#CC79A7", "#56B4E9", "#000000", "#F0E442"
-PALETTE = (BLUE, ORANGE, GREEN, VERMILION, PURPLE, SKY, BLACK)
-"""Colours that colour-blind readers can tell apart (Okabe and Ito, Color Universal Design, 2008)."""
-
-INK, GREY, PALE = "#262626", "#7A7A7A", "#E4E6E9"
+from polypod.bodies.palette import GREY, INK, PALE, PALETTE
 
 # In this order they stay distinct in black and white, too.
 DASHES = ("-", (0, (5, 1.5)), (0, (1.2, 1.2)), (0, (6, 1.5, 1.2, 1.5)), (0, (3, 1.2)))
@@ -74,11 +69,6 @@ def house_style() -> Iterator[None]:
         yield
     finally:
         mpl.rcParams.update(before)
-
-
-def color_of(index: int) -> str:
-    """The colour of leg (or curve) number `index`, from 0, the same in every figure."""
-    return PALETTE[index % len(PALETTE)]
 
 
 def dash_of(index: int) -> Any:

@@ -14,9 +14,10 @@ from matplotlib.patches import PathPatch
 from matplotlib.path import Path as Outline
 from numpy.typing import NDArray
 
+from polypod.bodies.palette import INK, PALE
 from polypod.errors import UnknownNameError, WorkspaceError
 from polypod.plots.canvas import Canvas, cells, pyplot_figure, size_of
-from polypod.plots.style import INK, PALE, house_style
+from polypod.plots.style import house_style
 from polypod.workspaces.workspace import Workspace
 
 Array = NDArray[np.float64]

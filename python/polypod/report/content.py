@@ -19,6 +19,7 @@ from polypod.solution.actuator_sizing import requirements
 from polypod.solution.solution import Solution
 from polypod.solution.solve import solve
 from polypod.summary.facts import describe, summarise
+from polypod.workspaces.search import workspace as find_workspace
 from polypod.workspaces.search_region import own_coordinates
 from polypod.workspaces.workspace import Workspace
 
@@ -104,13 +105,13 @@ def workspace_of(
     if not wanted:
         return None, "It was left out."
     try:
-        return mech.workspace(step=step), ""
+        return find_workspace(mech, step=step), ""
     except PolypodError as error:
         if step is not None:
             raise
         why = f"None was found: {error}."
     try:
-        return (mech.workspace(own_coordinates(mech)), "") if mech.dof in (2, 3) else (None, why)
+        return (find_workspace(mech, own_coordinates(mech)), "") if mech.dof in (2, 3) else (None, why)
     except PolypodError:
         return None, why
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from polypod import plots
 from polypod.mechanism import load
-from polypod.motion.motion import load_motion
+from polypod.motion.motion_file import load_motion
 from polypod.paper.section4 import section4
 from polypod.paper.table_i import MECHANISM
 from polypod.paper.tables import TABLE_II, section4_markdown, table_i_markdown, table_iii_markdown

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from polypod.answers.kinematics import Joint
+from polypod.answers.parts import Joint
 from polypod.mechanism import Mechanism
 from polypod.solution.solution import Solution
 from polypod.solution.solve import CHUNK

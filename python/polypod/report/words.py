@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+from polypod.answers.leg_words import slides, word
 from polypod.files.units import coordinate_unit, readable
 from polypod.report.content import Along, Content
-from polypod.summary.leg_words import slides, word
 from polypod.summary.tables import Table, fixed, outcome, range_mm, significant
 
 

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from polypod.mechanism import Mechanism
+from polypod.solution.extremes import greatest, least, number
 from polypod.solution.solution import Solution
-from polypod.summary.facts import _greatest, _least, stroke_limits
 
 Array = NDArray[np.float64]
 
@@ -61,6 +61,12 @@ def rms_over_time(time: Array, values: Array) -> float | None:
     return float(np.sqrt(np.sum(step * (squares[:-1] + squares[1:]) / 2) / duration))
 
 
+def stroke_limits(mech: Mechanism, leg: int) -> list[float | None]:
+    """Least and greatest length or place of a leg, m; None for no limit, also for a least length of zero."""
+    low, high = mech.stroke[leg]
+    return [number(low) if low != 0.0 or mech.sliders[leg] else None, number(high)]
+
+
 def _peak_and_rms(time: Array, values: Array) -> dict[str, float | None]:
     if not np.isfinite(values).any():
         return {"peak": None, "time": None, "rms": None}
@@ -69,13 +75,13 @@ def _peak_and_rms(time: Array, values: Array) -> dict[str, float | None]:
 
 
 def _stroke_used(lengths: Array, limits: list[float | None]) -> dict[str, Any]:
-    least, greatest = _least(lengths), _greatest(lengths)
-    used = None if least is None or greatest is None else greatest - least
+    shortest, longest = least(lengths), greatest(lengths)
+    used = None if shortest is None or longest is None else longest - shortest
     low, high = limits
     span = None if low is None or high is None else high - low
     return {
-        "least": least,
-        "greatest": greatest,
+        "least": shortest,
+        "greatest": longest,
         "used": used,
         "limits": [low, high],
         "share": None if used is None or not span else used / span,

@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class ComputedTorque:
-    """Forces that make a mechanism follow a motion: the law for `forces` of `Mechanism.simulate` [T55].
+    """Forces that make a mechanism follow a motion: the law for `forces` of `polypod.simulate` [T55].
 
     Legs are told the accelerations ℓ'' = ℓ_d'' + 2ζω (ℓ_d' - ℓ') + ω² (ℓ_d - ℓ), d for desired, and inverse
     dynamics gives their forces. With the masses of the mechanism that is driven, the error of every leg's
@@ -29,7 +29,7 @@ class ComputedTorque:
     >>> motion = pp.load_motion("lu-3spu-2rpu-r", mech)
     >>> start = mech.pose({"x": -0.325, "y": 0.21, "z": 0.6, "alpha": -0.279, "beta": 0.454})
     >>> law = pp.ComputedTorque(mech, motion, frequency=20.0)
-    >>> end = mech.simulate(start, forces=law, until=0.5, step=0.1, tolerance=1e-6).dataset.isel(time=-1)
+    >>> end = pp.simulate(mech, start, forces=law, until=0.5, step=0.1, tolerance=1e-6).dataset.isel(time=-1)
     >>> bool(abs(end.length - law.desired(0.5).lengths).max() < 1e-4)
     True
     """

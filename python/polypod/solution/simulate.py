@@ -16,7 +16,8 @@ from scipy.integrate import DOP853
 from scipy.optimize import brentq
 
 from polypod import _core
-from polypod.answers.kinematics import ForwardDynamics, State
+from polypod.answers.dynamics import ForwardDynamics
+from polypod.answers.kinematics import State
 from polypod.answers.singularity import Determinant
 from polypod.answers.status import Status
 from polypod.arrays import check_wrench_axes, doubles
@@ -61,19 +62,53 @@ class End(NamedTuple):
 def simulate(
     mech: Mechanism,
     pose: ArrayLike,
-    twist: ArrayLike,
+    twist: ArrayLike = (0.0,) * 6,
     *,
-    forces: Input | None,
-    wrench: Input | None,
-    wrench_axes: str,
+    forces: Input | None = None,
+    wrench: Input | None = None,
+    wrench_axes: str = "base",
     until: float,
     step: float,
-    tolerance: float,
-    stop: Sequence[str],
-    sigma_min: float | None,
-    progress: Callable[[float, float], None] | None,
+    tolerance: float = 1e-10,
+    stop: Sequence[str] = ("limits", "singularity"),
+    sigma_min: float | None = None,
+    progress: Callable[[float, float], None] | None = None,
 ) -> Solution:
-    """The motion from a state under forces: see `Mechanism.simulate`, which has the defaults."""
+    """The motion from a state under forces: integration over time on the constraints [T53, T54].
+
+    Args:
+        mech: the mechanism.
+        pose: (4, 4), at time 0.
+        twist: (6,), at time 0; at rest by default.
+        forces: active forces (n,), N, positive when they push the platform away: constant; or a pair of
+            times (k,) and rows (k, n), linear in between; or a function of time, pose (4, 4) and twist
+            (6,), without memory, because trial states are asked for, too. None for no forces.
+        wrench: load on the platform at o, (6,), N and N m, in the same three forms; the mechanism's own
+            by default.
+        wrench_axes: the axes of `wrench`, "base" or "platform".
+        until: the last time, s.
+        step: between the states of the result, and the longest step of the integration, s.
+        tolerance: of the integration, relative, for each of its steps.
+        stop: what ends the motion before: "limits", any limit of `limit_list`; "singularity", a change of
+            the sign of det J.
+        sigma_min: the smallest singular value below which the motion ends, too.
+        progress: called with the time that is reached and the last one.
+
+    Returns:
+        A `Solution` like that of `solve`, with `end`: the time, kind and reason of the end. The last
+        state is the one at which it ends, with its time to the accuracy of the integration.
+
+    Raises:
+        PolypodError: a state to start from that the mechanism cannot have, or numbers that are wrong.
+        ShapeError: forces, load, pose or twist of another shape.
+
+    >>> import polypod as pp
+    >>> mech = pp.load("lu-3spu-2rpu-r")
+    >>> pose = mech.pose({"alpha": 0.1, "p": -0.3, "h": 0.7, "beta": 0.7, "gamma": 0.5})
+    >>> fall = pp.simulate(mech, pose, until=1.0, step=0.01)
+    >>> fall.end["kind"], round(fall.end["time"], 3), fall.end["reason"]
+    ('limit', 0.083, 'stroke max of leg 3')
+    """
     for name, value in (("until", until), ("step", step), ("tolerance", tolerance)):
         if not 0.0 < value < np.inf:
             raise PolypodError(f"{name} is {value!r}; must be a positive number")

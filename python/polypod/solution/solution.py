@@ -17,9 +17,16 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from polypod.answers.notebook import Rows, card, counted, numbers, outcomes, rows_of
+from polypod.answers.status import Status
 from polypod.errors import SolutionError
+from polypod.solution.singularity_crossings import warnings_of
 
 _FORMAT = "polypod solution 1"
+
+OF_LEGS = ("length", "rate", "force")
+OF_STATES = ("actuator_power", "power_residual", "sigma_min", "condition")
+"""Variables that its card shows."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -37,14 +44,37 @@ class Solution:
     __hash__ = None  # type: ignore[assignment]
 
     def __repr__(self) -> str:
-        from polypod.cards import solution_heading
-
-        return "<{}; {}>".format(*solution_heading(self))
+        return "<{}; {}>".format(*self._heading())
 
     def _repr_html_(self) -> str:
-        from polypod.cards import of_solution
+        """Outcomes, legs, power and conditioning; how a simulation ended; singularities that are passed."""
+        data, notes = self.dataset, []
+        if self.end:
+            notes.append(f"ended at {self.end['time']:.6g} s: {self.end['reason']}")
+        if "singularities" in data.attrs:
+            notes += [f"⚠ {text}" for text in warnings_of(self.singularities)]
+        tables: list[Rows] = []
+        legs = [name for name in OF_LEGS if name in data and data[name].dims == ("time", "leg")]
+        if legs:
+            rows = [
+                (str(leg), *(numbers(data[name].sel(leg=leg)) for name in legs)) for leg in data["leg"].values
+            ]
+            tables.append(rows_of(("leg", *(_header(data[name]) for name in legs)), rows))
+        whole = [(_header(data[name]), numbers(data[name])) for name in OF_STATES if name in data]
+        tables.append(rows_of(("along the motion", ""), whole))
+        notes.append(f"{len(data.data_vars)} variables in .dataset")
+        return card(*self._heading(), tables, notes=notes)
 
-        return of_solution(self)
+    def _heading(self) -> tuple[str, str]:
+        """Its title, and how many states of which outcomes."""
+        data = self.dataset
+        said = []
+        if "time" in data and data.sizes["time"]:
+            first, last = data["time"].to_numpy()[[0, -1]].tolist()
+            said.append(f"{counted(data.sizes['time'])} from {first:g} s to {last:g} s")
+        if "status" in data:
+            said.append(outcomes(data["status"], Status))
+        return f"Solution: {data.attrs.get('title', '')}".removesuffix(": "), ": ".join(said)
 
     def to_xarray(self) -> xr.Dataset:
         """The dataset, for those who ask every result alike."""
@@ -79,6 +109,14 @@ class Solution:
                 write(self.dataset, temporary)
         except OSError as error:
             raise SolutionError(f"{path} cannot be written: {error.strerror or error}") from error
+
+
+def _header(variable: Any) -> str:
+    """Such as "leg length r / m"."""
+    attrs = variable.attrs
+    unit = attrs.get("units", "")
+    name = f"{attrs.get('long_name', variable.name)} {attrs.get('symbol', '')}".rstrip()
+    return name + (f" / {unit}" if unit not in ("", "1") else "")
 
 
 def load_solution(path: str | PathLike[str]) -> Solution:

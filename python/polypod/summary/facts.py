@@ -5,18 +5,19 @@ SI units and radians. Numbers that do not exist (no stroke limit, no answer) are
 
 from __future__ import annotations
 
-import math
 from collections import Counter, defaultdict
 from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from polypod.answers.kinematics import Mobility
+from polypod.answers.mobility import Mobility
 from polypod.answers.status import Status, count
 from polypod.mechanism import Mechanism, list_mechanisms, load
+from polypod.solution.actuator_sizing import stroke_limits
+from polypod.solution.extremes import greatest, least, number, peak
 from polypod.solution.singularity_crossings import warnings_of
 from polypod.solution.solution import Solution
 from polypod.summary.freedoms import constraint_wrenches, freedoms
@@ -115,9 +116,9 @@ def describe(mech: Mechanism) -> dict[str, Any]:
         "characteristic_length": mech.characteristic_length,
         "centre_pose": {
             "pose": mech.home.tolist(),
-            "sigma_min": _number(centre.sigma_min),
-            "sigma_max": _number(centre.sigma_max),
-            "condition": _number(centre.condition),
+            "sigma_min": number(centre.sigma_min),
+            "sigma_max": number(centre.sigma_max),
+            "condition": number(centre.condition),
         },
         "limits": _limits_at_home(mech),
         "warnings": mech.warnings,
@@ -133,9 +134,9 @@ def _limits_at_home(mech: Mechanism) -> list[dict[str, Any]]:
             "kind": limit.kind,
             "legs": limit.legs,
             "unit": limit.unit,
-            "allowed": [_number(limit.least), _number(limit.greatest)],
-            "margin": _number(home.margins[i]),
-            "relative": _number(home.relative[i]),
+            "allowed": [number(limit.least), number(limit.greatest)],
+            "margin": number(home.margins[i]),
+            "relative": number(home.relative[i]),
             "binds": bool(i == home.binding),
         }
         for i, limit in enumerate(mech.limit_list)
@@ -186,11 +187,11 @@ def summarise(mech: Mechanism, solution: Solution) -> dict[str, Any]:
         {
             "name": name,
             "joints": mech.leg_letters[i],
-            "length": [_least(of("length")[:, i]), _greatest(of("length")[:, i])],
+            "length": [least(of("length")[:, i]), greatest(of("length")[:, i])],
             "stroke": stroke_limits(mech, i),
             "outside_stroke": _outside(of("length")[:, i], mech.stroke[i]),
-            "peak_rate": _peak(of("rate")[:, i]),
-            "peak_force": _peak(of("force")[:, i]),
+            "peak_rate": peak(of("rate")[:, i]),
+            "peak_force": peak(of("force")[:, i]),
         }
         for i, name in enumerate(mech.leg_names)
     ]
@@ -210,8 +211,8 @@ def summarise(mech: Mechanism, solution: Solution) -> dict[str, Any]:
         "start": float(time[0]),
         "end": float(time[-1]),
         "platform": {
-            "peak_speed": _greatest(np.linalg.norm(of("twist")[:, :3], axis=-1)),
-            "peak_angular_speed": _greatest(np.linalg.norm(of("twist")[:, 3:], axis=-1)),
+            "peak_speed": greatest(np.linalg.norm(of("twist")[:, :3], axis=-1)),
+            "peak_angular_speed": greatest(np.linalg.norm(of("twist")[:, 3:], axis=-1)),
         },
         "legs": legs,
         "outcomes": outcomes,
@@ -219,8 +220,8 @@ def summarise(mech: Mechanism, solution: Solution) -> dict[str, Any]:
         if nearest is None
         else {
             "time": float(time[nearest]),
-            "sigma_min": _number(sigma[nearest]),
-            "condition": _number(of("condition")[nearest]),
+            "sigma_min": number(sigma[nearest]),
+            "condition": number(of("condition")[nearest]),
         },
         "singularities": {**solution.singularities, "warnings": warnings_of(solution.singularities)},
         "power": _power(solution),
@@ -253,9 +254,9 @@ def _limits(solution: Solution) -> dict[str, Any] | None:
         worst = slack(int(np.nanargmin(margins[:, i])), int(i))
         passed.append({**worst, "states": len(beyond), "first_time": float(time[beyond[0]])})
     known = np.isfinite(relative).any()
-    least = np.unravel_index(np.nanargmin(relative), relative.shape) if known else None
+    nearest = np.unravel_index(np.nanargmin(relative), relative.shape) if known else None
     return {
-        "least": None if least is None else slack(int(least[0]), int(least[1])),
+        "least": None if nearest is None else slack(int(nearest[0]), int(nearest[1])),
         "passed": passed,
         "not_determined": int(np.isnan(margins).any(axis=1).sum()),
     }
@@ -267,11 +268,11 @@ def _power(solution: Solution) -> dict[str, float | None]:
     names = ("actuator_power", "load_power", "damping_power", "friction_power")
     flows = np.sum([np.abs(data[name].to_numpy()) for name in names], axis=0)
     residual = data["power_residual"].to_numpy()
-    greatest, flow = _greatest(np.abs(residual)), _greatest(flows)
+    most, flow = greatest(np.abs(residual)), greatest(flows)
     return {
-        "peak_actuators": _peak(data["actuator_power"].to_numpy()),
-        "greatest_residual": greatest,
-        "relative_residual": greatest / flow if greatest is not None and flow else None,
+        "peak_actuators": peak(data["actuator_power"].to_numpy()),
+        "greatest_residual": most,
+        "relative_residual": most / flow if most is not None and flow else None,
     }
 
 
@@ -282,53 +283,23 @@ def _coupled(solution: Solution) -> dict[str, Any] | None:
         return None
     forces, printed = data["coupled_force"].to_numpy(), data["coupled_force_as_printed"].to_numpy()
     ratio = np.abs(printed[:, 0] / np.where(forces[:, 0] == 0.0, np.nan, forces[:, 0]))
-    active = _greatest(np.abs(data["force"].to_numpy()))
-    largest = _greatest(np.abs(forces))
+    active = greatest(np.abs(data["force"].to_numpy()))
+    largest = greatest(np.abs(forces))
     return {
         "legs": data["coupled_leg"].to_numpy().tolist(),
-        "peak_forces": [_peak(f) for f in forces.T],
-        "peak_forces_as_printed": [_peak(f) for f in printed.T],
-        "peak_torque": _peak(data["coupled_torque"].to_numpy()),
-        "peak_torque_as_printed": _peak(data["coupled_torque_as_printed"].to_numpy()),
-        "consistent_over_printed": [_reciprocal(_greatest(ratio)), _reciprocal(_least(ratio))],
+        "peak_forces": [peak(f) for f in forces.T],
+        "peak_forces_as_printed": [peak(f) for f in printed.T],
+        "peak_torque": peak(data["coupled_torque"].to_numpy()),
+        "peak_torque_as_printed": peak(data["coupled_torque_as_printed"].to_numpy()),
+        "consistent_over_printed": [_reciprocal(greatest(ratio)), _reciprocal(least(ratio))],
         "note": "the couples in the joints of these legs are statically indeterminate and taken as zero",
         "share_of_active": largest / active if largest is not None and active else None,
     }
-
-
-# --- numbers that exist -------------------------------------------------------------------------------------
 
 
 def _outside(lengths: Array, stroke: Array) -> bool:
     return bool(np.any((lengths < stroke[0]) | (lengths > stroke[1])))
 
 
-def _number(value: ArrayLike) -> float | None:
-    number = float(np.asarray(value))
-    return number if math.isfinite(number) else None
-
-
-def stroke_limits(mech: Mechanism, leg: int) -> list[float | None]:
-    """Least and greatest length or place of a leg, m; None for no limit, also for a least length of zero."""
-    low, high = mech.stroke[leg]
-    return [_number(low) if low != 0.0 or mech.sliders[leg] else None, _number(high)]
-
-
 def _reciprocal(value: float | None) -> float | None:
     return 1.0 / value if value else None
-
-
-def _least(values: Array) -> float | None:
-    finite = values[np.isfinite(values)]
-    return float(finite.min()) if finite.size else None
-
-
-def _greatest(values: Array) -> float | None:
-    finite = values[np.isfinite(values)]
-    return float(finite.max()) if finite.size else None
-
-
-def _peak(values: Array) -> float | None:
-    """The value of largest magnitude, with its sign."""
-    finite = values[np.isfinite(values)]
-    return float(finite[np.argmax(np.abs(finite))]) if finite.size else None

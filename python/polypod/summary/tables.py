@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from polypod.answers.leg_words import word
 from polypod.files.units import coordinate_unit, readable
-from polypod.summary.leg_words import word
 
 Facts = dict[str, Any]
 

@@ -8,10 +8,10 @@ from typing import Any
 
 from jinja2 import Environment, PackageLoader
 
+from polypod.answers.leg_words import word
+from polypod.bodies.palette import GREY, color_of
 from polypod.files.units import coordinate_unit
 from polypod.mechanism import Mechanism
-from polypod.plots.style import GREY, color_of
-from polypod.summary.leg_words import word
 from polypod.viewer.model import Level, Note, Screw, View
 from polypod.viewer.scene import LEVEL_COLORS, RED
 

@@ -14,14 +14,16 @@ import numpy as np
 import trimesh
 from numpy.typing import NDArray
 
+from polypod.answers import leg_words
 from polypod.answers.kinematics import AssemblyModes
 from polypod.answers.status import Status
 from polypod.bodies.links import LinkPlaces
 from polypod.errors import PolypodError
-from polypod.summary import leg_words
+from polypod.mechanism import spans
 from polypod.viewer.model import LATERAL, Model
 from polypod.viewer.panel import Inbox, listen
 from polypod.viewer.scene import Arrows, add_labels, add_triads, add_workspace
+from polypod.workspaces.search import workspace
 from polypod.workspaces.workspace import Workspace
 
 if TYPE_CHECKING:
@@ -75,7 +77,7 @@ class Overlays:
 
     def _add_workspace(self) -> None:
         gui, mech = self._server.gui, self._model.mech
-        reach = 2e3 * LATERAL * float(leg_words.spans(mech).mean())
+        reach = 2e3 * LATERAL * float(spans(mech).mean())
         step = round(min(max(reach / 30.0, _STEPS[0]), _STEPS[1]))
         with gui.add_folder("Workspace", expand_by_default=True):
             self._step = gui.add_slider("step / mm", _STEPS[0], _STEPS[1], 1.0, float(step))
@@ -95,7 +97,7 @@ class Overlays:
                 self._say(self._found, f"Looking … {100.0 * done / total:.0f} %")
 
         try:
-            found = self._model.mech.workspace(step=step, threads=1, progress=progress)
+            found = workspace(self._model.mech, step=step, threads=1, progress=progress)
         except PolypodError as error:
             self._say(self._found, str(error))
             return

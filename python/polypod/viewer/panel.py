@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from polypod.summary import leg_words
+from polypod.answers import leg_words
 from polypod.viewer import html
 from polypod.viewer.model import Model, View
 from polypod.viewer.player import SPEEDS, Player

@@ -11,9 +11,9 @@ from scipy.spatial.transform import Rotation
 
 from polypod.answers.singularity import NEAR_SINGULAR
 from polypod.bodies.links import PLATFORM, STEEL, Link, leg_radii
+from polypod.bodies.palette import SKY, YELLOW
 from polypod.bodies.rails import way
 from polypod.mechanism import Mechanism
-from polypod.plots.style import SKY, YELLOW
 from polypod.viewer.model import Level, Model, View
 from polypod.workspaces.workspace import Workspace
 

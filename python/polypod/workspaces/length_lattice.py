@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -11,16 +11,17 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from polypod import _core
+from polypod.answers.notebook import card, rows_of
 from polypod.errors import UnsupportedError, WorkspaceError
+from polypod.files.units import readable
 from polypod.mechanism import Mechanism
-from polypod.workspaces.search_region import bounds_of, check_threads, start_of
+from polypod.workspaces.search_region import Progress, bounds_of, check_threads, start_of
 from polypod.workspaces.workspace import with_floor
 
 if TYPE_CHECKING:
     import xarray as xr
 
 Array = NDArray[np.float64]
-Progress = Callable[[int, int], None]
 
 DIVISIONS = 10
 """Steps of the shortest stroke by default."""
@@ -57,14 +58,22 @@ class LengthLattice:
     """What it was made from."""
 
     def __repr__(self) -> str:
-        from polypod.cards import lattice_heading
-
-        return "<{}; {}>".format(*lattice_heading(self))
+        return "<{}; {}>".format(*self._heading())
 
     def _repr_html_(self) -> str:
-        from polypod.cards import of_lattice
+        """Extents of o, and how steps ended."""
+        rows = [
+            (name, *(readable(value, "m") for value in (low, high, high - low)))
+            for name, (low, high) in zip("xyz", self.extents.tolist(), strict=True)
+        ]
+        notes = [f"{self.at_limits} steps end at limits or bounds, {self.singular} in a singularity"]
+        table = rows_of(("o", "least", "greatest", "width"), rows)
+        return card(*self._heading(), [table], notes=notes)
 
-        return of_lattice(self)
+    def _heading(self) -> tuple[str, str]:
+        """What it is, and how many nodes."""
+        said = f"steps of {readable(self.step, 'm')}, {self.inside} of {self.nodes} combinations inside"
+        return f"Lattice of leg lengths of {self.inputs['mechanism']}", f"{said}, {self.poses} poses"
 
     def to_xarray(self) -> xr.Dataset:
         """Extents, and the profile over the layers of z, as one dataset; counts and inputs as attributes."""
@@ -116,7 +125,27 @@ def length_lattice(
     threads: int = 0,
     progress: Progress | None = None,
 ) -> LengthLattice:
-    """The positions of o over a lattice of leg lengths; see `Mechanism.length_lattice`."""
+    """Positions of o for all combinations of leg lengths in one aspect [T41].
+
+    The way of the paper's Section 4: every actuated leg takes lengths from the least to the greatest of
+    its stroke, and forward kinematics continues from each combination to the next, as far as limits,
+    bounds and singularities let it. An aspect may hold several poses with the same lengths: all count.
+
+    Args:
+        mech: the mechanism.
+        step: of the lengths, m; a tenth of the shortest stroke by default.
+        layer: height of the layers of z for which widths are kept, m; `step` by default.
+        bounds: of o, least and greatest of x, y, z, m; what the legs reach by default, on the side of the
+            base where home is.
+        start: pose (4, 4) whose aspect is meant; by default a well conditioned one found from home.
+        sigma_min: a floor for the smallest singular value.
+        threads: 0 for those of `set_threads`. The result does not depend on it.
+        progress: called with the number of nodes reached and of all.
+
+    Raises:
+        UnsupportedError: an actuated leg without a stroke, or not as many of them as freedoms.
+        WorkspaceError: a step or start that is wrong.
+    """
     mech = with_floor(mech, sigma_min)
     check_threads(threads)
     driven = mech.sliders & mech.actuated

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -11,7 +11,14 @@ from polypod import _core
 from polypod.errors import WorkspaceError
 from polypod.mechanism import Mechanism
 from polypod.workspaces.boundary import Cuts
-from polypod.workspaces.search_region import bounds_of, check_threads, grid_of, own_coordinates, start_of
+from polypod.workspaces.search_region import (
+    Progress,
+    bounds_of,
+    check_threads,
+    grid_of,
+    own_coordinates,
+    start_of,
+)
 from polypod.workspaces.workspace import (
     EDGE_OF_GRID,
     NO_POSE,
@@ -25,8 +32,6 @@ from polypod.workspaces.workspace import (
 CELLS = 64
 """Cells along the longest side of the bounds by default."""
 
-Progress = Callable[[int, int], None]
-
 
 def reachable(
     mech: Mechanism,
@@ -39,7 +44,7 @@ def reachable(
     threads: int = 0,
     progress: Progress | None = None,
 ) -> Workspace:
-    """The positions of o that can be reached from a start pose; see `Mechanism.workspace`."""
+    """The positions of o that can be reached from a start pose; see `polypod.workspace`."""
     mech = with_floor(mech, sigma_min)
     check_threads(threads)
     grid = grid_of(bounds_of(mech, ("x", "y", "z"), bounds), _one(step), CELLS, cubic=True)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,6 +16,8 @@ from polypod.files.units import coordinate_unit
 from polypod.mechanism import Mechanism
 
 Array = NDArray[np.float64]
+Progress = Callable[[int, int], None]
+"""Called with the number of nodes done and of all."""
 
 MOST_NODES = 10**9
 """Nodes of the largest grid; its mask takes 1 GB."""

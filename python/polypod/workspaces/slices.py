@@ -5,7 +5,7 @@ The constant-orientation workspace, the orientation workspace at a point and eve
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,7 +15,7 @@ from scipy import ndimage
 from polypod.errors import CoordinateError, WorkspaceError, alternatives
 from polypod.mechanism import Mechanism
 from polypod.workspaces.boundary import Cuts, open_edges
-from polypod.workspaces.search_region import Grid, bounds_of, checked_start, grid_of
+from polypod.workspaces.search_region import Grid, Progress, bounds_of, checked_start, grid_of
 from polypod.workspaces.workspace import (
     EDGE_OF_GRID,
     NO_POSE,
@@ -28,7 +28,6 @@ from polypod.workspaces.workspace import (
 
 Array = NDArray[np.float64]
 Aspects = NDArray[np.int8]
-Progress = Callable[[int, int], None]
 
 CELLS = {2: 200, 3: 60}
 """Cells along each of the bounds by default, by the number of coordinates that vary.
@@ -133,7 +132,7 @@ def sliced(
     sigma_min: float | None = None,
     progress: Progress | None = None,
 ) -> Workspace:
-    """The values that two or three coordinates can take together; see `Mechanism.workspace`."""
+    """The values that two or three coordinates can take together; see `polypod.workspace`."""
     mech = with_floor(mech, sigma_min)
     pose = None if start is None else checked_start(mech, start)
     cut = _Slice(mech, vary, fix or {}, branch, pose, keep_aspect)

@@ -15,10 +15,11 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from polypod import _core
+from polypod.answers.notebook import card, number, rows_of
+from polypod.bodies.palette import GREY, INK, PALE, YELLOW, color_of
 from polypod.errors import WorkspaceError
-from polypod.files.units import coordinate_unit
+from polypod.files.units import coordinate_unit, readable
 from polypod.mechanism import Mechanism
-from polypod.plots.style import GREY, INK, PALE, YELLOW, color_of
 from polypod.solution.solution import replacing
 from polypod.workspaces.boundary import Cuts, content_with_error, surface
 from polypod.workspaces.search_region import Grid
@@ -160,21 +161,37 @@ class Workspace:
     __hash__ = None  # type: ignore[assignment]
 
     def __repr__(self) -> str:
-        from polypod.cards import workspace_heading
-
-        return "<{}; {}>".format(*workspace_heading(self))
+        return "<{}; {}>".format(*self._heading())
 
     def _repr_html_(self) -> str:
-        from polypod.cards import of_workspace
+        """Extents, size, and what ends it at which share of the boundary."""
+        pairs = zip(self.names, self.extents.tolist(), self.units, strict=True)
+        extents = [
+            (name, *(readable(value, unit) for value in (low, high, high - low)))
+            for name, (low, high), unit in pairs
+        ]
+        ends = [(name, f"{100 * share:.1f} %") for name, share in self.shares.items()]
+        return card(
+            *self._heading(),
+            [rows_of(("", "least", "greatest", "width"), extents), rows_of(("what ends it", "of it"), ends)],
+            notes=[f"{int(self.mask.sum())} of {self.mask.size} nodes inside"],
+        )
 
-        return of_workspace(self)
+    def _heading(self) -> tuple[str, str]:
+        """What it is, and how large."""
+        fixed = self.inputs.get("fixed") or {}
+        at = ", ".join(f"{name} = {readable(value, coordinate_unit(name))}" for name, value in fixed.items())
+        size = f"{number(self.volume)} ± {self.volume_error:.1g} {self.volume_unit}"
+        title = f"Workspace of {self.inputs['mechanism']}"
+        word = "volume" if len(self.names) == 3 else "area"
+        return title, f"{self.kind} {', '.join(self.names)}{f' at {at}' if at else ''}: {word} {size}"
 
     def save(self, path: str | PathLike[str]) -> None:
         """Writes the boundary (`.stl`, `.ply`, `.glb`) or everything (`.nc`); meshes are in m and rad.
 
         STL holds single precision and no labels. PLY holds double precision, the label of each vertex as a
         number and a colour, and the labels' names as comments. GLB holds single precision and the colours,
-        and is for positions: y is up in it, see `polypod.export.gltf`.
+        and is for positions: y is up in it, see `polypod.files.glb`.
 
         Raises WorkspaceError for another suffix, for a mesh of two coordinates, and for GLB of angles.
         """
@@ -192,7 +209,7 @@ class Workspace:
 
     def _glb(self) -> bytes:
         """A GLB scene of the boundary in the labels' colours."""
-        from polypod.export.gltf import mesh_glb
+        from polypod.files.glb import mesh_glb
 
         return mesh_glb(self.mesh(), self._rgb[self.labels], f"workspace of {self.mechanism.name}")
 
