@@ -12,8 +12,9 @@ import numpy as np
 import pytest
 
 import polypod as pp
-from polypod.multibody.placement import PLATFORM, turned
+from polypod.multibody.placement import PLATFORM
 from polypod.multibody.tree import describe
+from polypod.vectors import turned
 from polypod.verify import integrate, table, verify_states
 from polypod.verify.constraints import Links, Square, jacobian, redundant, residual, rows_of
 

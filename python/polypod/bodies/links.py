@@ -17,9 +17,10 @@ from trimesh import Trimesh
 from polypod.answers.answer import Codes
 from polypod.answers.kinematics import InverseKinematics
 from polypod.bodies.palette import PALE, color_of
-from polypod.bodies.rails import Rail, behind, flat_normal, lower_ends, unit, way
-from polypod.bodies.solids import across, ball, block, lathe, plate, tube
+from polypod.bodies.rails import Rail, behind, flat_normal, lower_ends, way
+from polypod.bodies.solids import ball, block, lathe, plate, tube
 from polypod.mechanism import Mechanism
+from polypod.vectors import perpendiculars, unit
 
 Array = NDArray[np.float64]
 LinkKind = Literal["base", "rod", "cylinder", "piston", "carriage", "strut", "platform"]
@@ -161,7 +162,7 @@ def _filled(axes: Array, lines: Array, column: int) -> tuple[Array, NDArray[np.b
     result = axes.copy()
     for at in np.argwhere(~known & np.isfinite(lines).all(axis=-1)):
         line = lines[tuple(at)]
-        first, second = across(line)
+        first, second = perpendiculars(line)
         # Both orders are right-handed: (a, line, a×line) and (line, a, line×a).
         columns = [-first, line, second] if column == 1 else [line, first, second]
         result[tuple(at)] = np.stack(columns, axis=-1)
@@ -289,7 +290,7 @@ class _Shapes:
     def _rod(self, index: int) -> list[Piece]:
         """A bar along the first axis through the joints that it carries, and a bearing at each end."""
         rod, thick = self._spec["rods"][index], self._thick
-        axis = np.array(rod["axis"]) / np.linalg.norm(rod["axis"])
+        axis = unit(rod["axis"])
         on = [i for i, leg in enumerate(self._spec["legs"]) if leg["base"]["rod"] == index]
         along = (self._base[on] - rod["point"]) @ axis
         low, high = along.min() - 3.2 * thick, along.max() + 3.2 * thick

@@ -8,6 +8,14 @@ PALETTE = (BLUE, ORANGE, GREEN, VERMILION, PURPLE, SKY, BLACK)
 INK, GREY, PALE = "#262626", "#7A7A7A", "#E4E6E9"
 
 
+Rgb = tuple[int, int, int]
+
+
+def rgb(color: str) -> Rgb:
+    """Red, green, blue from 0 to 255 of a colour such as #C9CDD3."""
+    return int(color[1:3], 16), int(color[3:5], 16), int(color[5:7], 16)
+
+
 def color_of(index: int) -> str:
     """The colour of leg (or curve) number `index`, from 0, the same in every figure."""
     return PALETTE[index % len(PALETTE)]

@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 from trimesh import Trimesh
 
-from polypod.bodies.solids import across, beam, tube
+from polypod.bodies.solids import beam, tube
+from polypod.vectors import perpendiculars, unit
 
 Array = NDArray[np.float64]
 
@@ -80,10 +81,4 @@ def behind(axis: Array, away: Array) -> Array:
     """Unit vector square to a rail, as near to `away` as can be."""
     square = away - axis * (axis @ away)
     size = np.linalg.norm(square)
-    return across(axis)[0] if size <= 1e-9 * np.linalg.norm(away) else np.asarray(square / size)
-
-
-def unit(vector: Any) -> Array:
-    """The direction of a vector."""
-    array = np.asarray(vector, float)
-    return np.asarray(array / np.linalg.norm(array))
+    return perpendiculars(axis)[0] if size <= 1e-9 * np.linalg.norm(away) else np.asarray(square / size)

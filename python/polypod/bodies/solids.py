@@ -12,6 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from trimesh import Trimesh
 
+from polypod.vectors import cross, perpendiculars, unit
+
 Array = NDArray[np.float64]
 
 SIDES = 20
@@ -73,9 +75,8 @@ def lathe(
     points = np.asarray(profile, float)
     points = _finer(np.vstack([points, points[:1]]) if closed else points)
     points = points[:-1] if closed else points
-    origin, line = np.asarray(start, float), np.asarray(axis, float)
-    line = line / np.linalg.norm(line)
-    x, y = across(line)
+    origin, line = np.asarray(start, float), unit(axis)
+    x, y = perpendiculars(line)
     turn = np.linspace(0.0, 2.0 * np.pi, sides, endpoint=False)
     ring = np.cos(turn)[:, None] * x + np.sin(turn)[:, None] * y
     rings = origin + points[:, 1, None, None] * line + points[:, 0, None, None] * ring
@@ -121,7 +122,7 @@ def beam(start: ArrayLike, end: ArrayLike, width: float, side: ArrayLike) -> Tri
     start, side = np.asarray(start, float), np.asarray(side, float)
     along = np.asarray(end, float) - start
     length = float(np.linalg.norm(along))
-    other = np.cross(along / length, side)
+    other = cross(along / length, side)
     mesh = tube((0.0, 0.0, 0.0), (0.0, 0.0, length), width / np.sqrt(2), sides=4)
     place = np.eye(4)
     # Its edges are at the first and second axis.
@@ -135,7 +136,7 @@ def beam(start: ArrayLike, end: ArrayLike, width: float, side: ArrayLike) -> Tri
 
 def plate(points: Array, normal: Array, thickness: float, margin: float) -> Trimesh:
     """A flat plate with round corners under (k, 3) points; the unit `normal` points from it to them."""
-    x, y = across(normal)
+    x, y = perpendiculars(normal)
     height = float(np.min(points @ normal))
     flat = points @ np.stack([x, y], axis=-1)
     turn = np.linspace(0.0, 2.0 * np.pi, 144, endpoint=False)
@@ -151,11 +152,3 @@ def plate(points: Array, normal: Array, thickness: float, margin: float) -> Trim
     disc = middle + inwards * (outline - middle)
     top = disc[..., :1] * x + disc[..., 1:] * y + height * normal
     return skin(np.concatenate([top[::-1], top - thickness * normal]))
-
-
-def across(axis: Array) -> tuple[Array, Array]:
-    """Two unit vectors at right angles to a unit vector and to one another."""
-    other = np.eye(3)[np.argmin(np.abs(axis))]
-    x = np.cross(axis, other)
-    x /= np.linalg.norm(x)
-    return x, np.cross(axis, x)

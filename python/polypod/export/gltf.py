@@ -17,10 +17,11 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from polypod.bodies.links import Link, Piece, link_frames, links_of
+from polypod.bodies.palette import rgb
 from polypod.errors import ExportError
 from polypod.files.glb import Y_UP, glb_of, linear_rgb, unused_name
 from polypod.mechanism import Mechanism
-from polypod.multibody.placement import inverse
+from polypod.vectors import inverse
 
 Array = NDArray[np.float64]
 
@@ -114,7 +115,7 @@ def _parents(mech: Mechanism, links: tuple[Link, ...]) -> list[int | None]:
 def _shaded(piece: Piece) -> trimesh.Trimesh:
     """A piece in its colour, with round faces that look round."""
     mesh: trimesh.Trimesh = trimesh.graph.smooth_shade(piece.mesh, angle=SHARP, facet_minarea=None)
-    srgb = np.array([int(piece.color[i : i + 2], 16) for i in (1, 3, 5)], np.uint8)
+    srgb = np.array(rgb(piece.color), np.uint8)
     color = [*linear_rgb(srgb).tolist(), 255]
     visual: Any = trimesh.visual
     material = visual.material.PBRMaterial(

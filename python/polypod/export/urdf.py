@@ -22,8 +22,9 @@ from polypod.export.omissions import FORCES, PLATFORM_TURNS, STROKES, TURNS, los
 from polypod.export.shapes import Shape
 from polypod.export.xml_common import INERTIA, NO_LIMIT, bounds, child, effort, lopsided, roll_pitch_yaw
 from polypod.multibody.mjcf import joint_name, numbers
-from polypod.multibody.placement import BASE, PLATFORM, inverse
+from polypod.multibody.placement import BASE, PLATFORM
 from polypod.multibody.tree import POINT, Body, Freedom
+from polypod.vectors import inverse
 
 Array = NDArray[np.float64]
 

@@ -18,10 +18,10 @@ from trimesh import Trimesh
 
 from polypod.bodies.links import JOINT, Link, leg_radii, link_frames, links_of
 from polypod.bodies.palette import INK
-from polypod.bodies.rails import unit
 from polypod.bodies.solids import four_sided, tube
 from polypod.mechanism import Mechanism
 from polypod.plots.canvas import size_of
+from polypod.vectors import unit
 
 Array = NDArray[np.float64]
 DrawnOut = Callable[[Array], tuple[Array, NDArray[np.bool_]]]
@@ -191,8 +191,7 @@ class Scene:
                 self.faces.add(piece.mesh, piece.color, place, bared or drawn_out)
 
     def _rod_label(self, rod: dict[str, Any], points: Array, thick: float) -> None:
-        axis, start = np.array(rod["axis"]), np.array(rod["point"])
-        axis = axis / np.linalg.norm(axis)
+        axis, start = unit(rod["axis"]), np.array(rod["point"])
         along = (points - start) @ axis
         side = start + (0.7 * along.min() + 0.3 * along.max()) * axis
         self.labels.append((side + np.array([0.0, 0.0, 2.2 * thick]), f"${math_name(rod['name'])}$"))

@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 from scipy.linalg import qr
 
 from polypod.answers.status import Status
-from polypod.multibody.placement import BASE, PLATFORM, Placements, across, cross, inverse
+from polypod.multibody.placement import BASE, PLATFORM, Placements
 from polypod.multibody.tree import POINT, Body, Closure, Multibody, X, Y, Z
+from polypod.vectors import cross, inverse, perpendiculars
 
 Array = NDArray[np.float64]
 
@@ -70,11 +71,11 @@ def _joint_rows(body: Body, parent: Array) -> list[Row]:
             squares = ()
         case ["revolute"]:
             axis = body.freedoms[0].axis
-            squares = [(axis, other) for other in across(axis)]
+            squares = [(axis, other) for other in perpendiculars(axis)]
         case ["revolute", "revolute"]:
             squares = [(body.freedoms[0].axis, body.freedoms[1].axis)]
         case ["prismatic"]:
-            slides = across(body.freedoms[0].axis)
+            slides = perpendiculars(body.freedoms[0].axis)
         case []:
             pass
         case kinds:

@@ -17,8 +17,9 @@ from exudyn.rigidBodyUtilities import AngularVelocity2EulerParameters_t, Rotatio
 from numpy.typing import NDArray
 
 from polypod.answers.status import Status
-from polypod.multibody.placement import BASE, PLATFORM, Placements, across, cross
+from polypod.multibody.placement import BASE, PLATFORM, Placements
 from polypod.multibody.tree import POINT, Body, Multibody, Y
+from polypod.vectors import cross, perpendiculars
 from polypod.verify.constraints import Row, Slide, Start
 from polypod.verify.twin import Forced, inertial
 
@@ -260,7 +261,7 @@ class System:
 
 def _axis_in_column(axis: Array, column: int) -> Array:
     """(3, 3): a rotation with a unit axis in a column."""
-    return np.roll(np.column_stack([axis, *across(axis)]), column, axis=1)
+    return np.roll(np.column_stack([axis, *perpendiculars(axis)]), column, axis=1)
 
 
 def _settings(duration: float, steps: int) -> Any:

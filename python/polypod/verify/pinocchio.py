@@ -14,8 +14,9 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from polypod.answers.status import Status
-from polypod.multibody.placement import BASE, PLATFORM, Placements, cross, inverse
+from polypod.multibody.placement import BASE, PLATFORM, Placements
 from polypod.multibody.tree import Body, Freedom, Multibody, joint_values, release
+from polypod.vectors import cross, inverse
 
 Array = NDArray[np.float64]
 

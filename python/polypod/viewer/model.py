@@ -14,10 +14,10 @@ from polypod.answers.leg_words import word
 from polypod.answers.singularity import NEAR_SINGULAR, TOLERANCE, SingularityKind
 from polypod.answers.status import Status
 from polypod.bodies.links import LinkPlaces, links_of
-from polypod.bodies.rails import unit
 from polypod.errors import PolypodError, UnknownNameError
 from polypod.files.units import KIND_OF_COORDINATE, coordinate_unit, readable
 from polypod.mechanism import Mechanism, spans
+from polypod.vectors import unit
 from polypod.viewer.player import Track
 
 Array = NDArray[np.float64]

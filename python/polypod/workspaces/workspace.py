@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from polypod import _core
 from polypod.answers.notebook import card, number, rows_of
-from polypod.bodies.palette import GREY, INK, PALE, YELLOW, color_of
+from polypod.bodies.palette import GREY, INK, PALE, YELLOW, color_of, rgb
 from polypod.errors import WorkspaceError
 from polypod.files.units import coordinate_unit, readable
 from polypod.mechanism import Mechanism
@@ -216,7 +216,7 @@ class Workspace:
     @property
     def _rgb(self) -> np.ndarray[Any, np.dtype[np.uint8]]:
         """(labels, 3): the colours from 0 to 255."""
-        return np.array([[int(c[i : i + 2], 16) for i in (1, 3, 5)] for c in self.colors], np.uint8)
+        return np.array([rgb(color) for color in self.colors], np.uint8)
 
     def _ply(self) -> bytes:
         """A binary PLY file."""
@@ -254,7 +254,7 @@ class Workspace:
 
 def _mixed(color: str, other: str, share: float) -> str:
     """A colour with a share of another one."""
-    parts = [[int(c[i : i + 2], 16) for i in (1, 3, 5)] for c in (color, other)]
+    parts = rgb(color), rgb(other)
     return "#" + "".join(f"{round((1 - share) * a + share * b):02X}" for a, b in zip(*parts, strict=True))
 
 
