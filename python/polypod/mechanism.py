@@ -61,6 +61,7 @@ from polypod.errors import (
     alternatives,
 )
 from polypod.files.mechanism_schema import read_spec
+from polypod.files.text import read_text
 from polypod.files.toml_lines import line_of, read_toml
 from polypod.files.units import readable
 
@@ -1164,10 +1165,9 @@ def load(source: str | Path) -> Mechanism:
         return Mechanism.from_toml((_built_in() / f"{name}.toml").read_text(encoding="utf-8"), origin=name)
     if not path.is_file():
         raise UnknownNameError("mechanism file or built-in mechanism", name, list_mechanisms())
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise MechanismError([Fault("toml", f"is not UTF-8 text: {error}")], name) from None
+    text = read_text(path)
+    if isinstance(text, Fault):
+        raise MechanismError([text], name)
     return Mechanism.from_toml(text, origin=name)
 
 

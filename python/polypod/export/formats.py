@@ -22,9 +22,10 @@ from polypod.export.shapes import Shape, meshes, simple
 from polypod.export.stl import write_stl
 from polypod.export.urdf import urdf
 from polypod.export.xml_common import save_meshes
+from polypod.files.text import replacing
 from polypod.mechanism import Mechanism
 from polypod.motion.motion import Motion
-from polypod.solution.solution import Solution, replacing
+from polypod.solution.solution import Solution
 from polypod.solution.solve import solve, states_along
 
 Array = NDArray[np.float64]

@@ -31,10 +31,13 @@ class Column(NamedTuple):
     unit: str
 
 
-def read_rows(text: str) -> list[Row]:
-    """The lines that are neither empty nor comments, the header first."""
+def read_rows(text: str) -> list[Row] | Fault:
+    """The lines that are neither empty nor comments, the header first; or what keeps them from being read."""
     reader = csv.reader(text.splitlines(), skipinitialspace=True)
-    rows = [(f"line {reader.line_num}", [cell.strip() for cell in row]) for row in reader]
+    try:
+        rows = [(f"line {reader.line_num}", [cell.strip() for cell in row]) for row in reader]
+    except csv.Error as error:
+        return Fault(f"line {reader.line_num}", f"is no row of a CSV file: {error}")
     return [(place, row) for place, row in rows if any(row) and not row[0].startswith("#")]
 
 

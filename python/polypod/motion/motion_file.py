@@ -25,7 +25,6 @@ A TOML file gives keyframes and the curve through them:
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from importlib import resources
@@ -41,6 +40,8 @@ from pydantic import Strict, create_model
 from polypod.errors import Fault, MotionError, UnknownNameError, alternatives, shown
 from polypod.files.csv_columns import Column, columns_to_si, read_header, read_numbers, read_rows
 from polypod.files.mechanism_schema import Number, Table, Vector, read_table
+from polypod.files.text import read_text
+from polypod.files.toml_lines import read_toml
 from polypod.files.units import KIND_OF_COORDINATE, MOTION_KINDS, read_units
 from polypod.motion.motion import SPLINES, Array, Axes, Motion, linear, not_increasing
 
@@ -79,18 +80,20 @@ def load_motion(
     """
     file = _find(source)
     read = _read_csv if file.name.endswith(".csv") else _read_toml
-    try:
-        motion = read(file.read_text(encoding="utf-8-sig"), str(source), mech)
-    except FileNotFoundError:
-        raise MotionError([Fault("file", "does not exist")], str(source)) from None
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise MotionError([Fault("file", f"cannot be read: {error}")], str(source)) from error
+    motion = read(_text_of(file, source), str(source), mech)
     return replace(motion, branch=branch or motion.branch, wrench_axes=wrench_axes or motion.wrench_axes)
 
 
 def motion_text(source: str | PathLike[str]) -> str:
     """The text of such a file or built-in motion."""
-    return _find(source).read_text(encoding="utf-8-sig")
+    return _text_of(_find(source), source)
+
+
+def _text_of(file: Traversable, source: str | PathLike[str]) -> str:
+    text = read_text(file)
+    if isinstance(text, Fault):
+        raise MotionError([text], str(source))
+    return text
 
 
 def motion_names() -> list[str]:
@@ -136,6 +139,8 @@ def _nearest_set(names: Iterable[str], sets: CoordinateSets) -> str:
 
 def _read_csv(text: str, source: str, mech: HasCoordinateSets | CoordinateSets) -> Motion:
     rows = read_rows(text)
+    if isinstance(rows, Fault):
+        raise MotionError([rows], source)
     if not rows:
         message = "is empty; needs a header such as time [s], x [mm], ... and two samples or more"
         raise MotionError([Fault("file", message)], source)
@@ -209,7 +214,9 @@ _SECTIONS = ("motion", "units", "wrench", "keyframes")
 
 
 def _read_toml(text: str, source: str, mech: HasCoordinateSets | CoordinateSets) -> Motion:
-    data = tomllib.loads(text)
+    data = read_toml(text)
+    if isinstance(data, Fault):
+        raise MotionError([data], source)
     faults = [Fault(k, f"is no key here; {alternatives(k, _SECTIONS)}") for k in data if k not in _SECTIONS]
     settings = read_table(_Settings, data.get("motion", {}), "motion", faults)
     wrench = read_table(_Wrench, data.get("wrench", {}), "wrench", faults) or _Wrench()

@@ -16,6 +16,7 @@ from markupsafe import Markup
 from plotly.offline import get_plotlyjs
 
 from polypod.files.mechanism_schema import SLIDER_LINKS, TELESCOPE_LINKS
+from polypod.files.text import replacing
 from polypod.mechanism import Mechanism
 from polypod.report import figures, groups
 from polypod.report.charts import Chart, Series
@@ -26,7 +27,6 @@ from polypod.report.inputs import MotionSource, versions
 from polypod.report.reactions import reactions_table
 from polypod.report.space import workspace_figure
 from polypod.report.words import actuators_table, glance, outcomes, warnings, workspace_words
-from polypod.solution.solution import replacing
 from polypod.summary import tables
 from polypod.workspaces.workspace import Workspace
 

@@ -21,6 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 from polypod.answers.status import Status
 from polypod.errors import CoordinateError, Fault, LengthsError
 from polypod.files.csv_columns import columns_to_si, read_header, read_numbers, read_rows
+from polypod.files.text import read_text
 from polypod.files.units import KIND_OF_COORDINATE, si_unit
 from polypod.mechanism import Mechanism
 
@@ -32,12 +33,10 @@ def load_lengths(source: str | PathLike[str], mech: Mechanism) -> Array:
 
     Raises LengthsError with all faults of the file.
     """
-    try:
-        rows = read_rows(Path(source).read_text(encoding="utf-8-sig"))
-    except FileNotFoundError:
-        raise LengthsError([Fault("file", "does not exist")], str(source)) from None
-    except (OSError, UnicodeDecodeError) as error:
-        raise LengthsError([Fault("file", f"cannot be read: {error}")], str(source)) from error
+    text = read_text(Path(source))
+    rows = text if isinstance(text, Fault) else read_rows(text)
+    if isinstance(rows, Fault):
+        raise LengthsError([rows], str(source))
     if len(rows) < 2:
         example = ", ".join(f"{name} [mm]" for name in mech.leg_names)
         raise LengthsError(

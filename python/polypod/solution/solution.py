@@ -6,9 +6,6 @@ import csv
 import itertools
 import json
 import math
-import os
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
@@ -19,7 +16,8 @@ import xarray as xr
 
 from polypod.answers.notebook import Rows, card, counted, numbers, outcomes, rows_of
 from polypod.answers.status import Status
-from polypod.errors import SolutionError
+from polypod.errors import Fault, SolutionError
+from polypod.files.text import read_text, replacing
 from polypod.solution.singularity_crossings import warnings_of
 
 _FORMAT = "polypod solution 1"
@@ -137,17 +135,6 @@ def _unknown_suffix(path: Path) -> str:
     return f"{path} ends in {path.suffix!r}; a solution's file ends in .nc or .csv"
 
 
-@contextmanager
-def replacing(path: Path) -> Iterator[Path]:
-    """A path beside `path` to write to, which takes its place once all is written."""
-    temporary = path.with_name(f".{path.name}.{os.getpid()}")
-    try:
-        yield temporary
-        temporary.replace(path)
-    finally:
-        temporary.unlink(missing_ok=True)
-
-
 # --- NetCDF ------------------------------------------------------------------------------------------------
 
 
@@ -191,7 +178,10 @@ def _write_csv(dataset: xr.Dataset, path: Path) -> None:
 
 
 def _read_csv(path: Path) -> xr.Dataset:
-    *lines, end = path.read_text(encoding="utf-8").split("\n")
+    text = read_text(path)
+    if isinstance(text, Fault):
+        raise ValueError(text.message)
+    *lines, end = text.split("\n")
     comments = [line.removeprefix("# ") for line in lines if line.startswith("# ")]
     _check(comments[:1] == [_FORMAT], f"it does not say {_FORMAT!r}")
     _check(end == "", "its last line is cut off")

@@ -18,9 +18,9 @@ from polypod import _core
 from polypod.answers.notebook import card, number, rows_of
 from polypod.bodies.palette import GREY, INK, PALE, YELLOW, color_of, rgb
 from polypod.errors import WorkspaceError
+from polypod.files.text import replacing
 from polypod.files.units import coordinate_unit, readable
 from polypod.mechanism import Mechanism
-from polypod.solution.solution import replacing
 from polypod.workspaces.boundary import Cuts, content_with_error, surface
 from polypod.workspaces.search_region import Grid
 
