@@ -25,7 +25,7 @@ from pathlib import Path
 import pytest
 
 import polypod as pp
-from polypod.files.mechanism_schema import read_spec
+from polypod.files.mechanism_spec import read_spec
 from polypod.solution.poses_of_lengths import load_lengths
 from polypod.solution.solve import VARIABLES
 

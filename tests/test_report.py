@@ -18,7 +18,7 @@ from polypod.report.formulas import to_html
 from polypod.report.reactions import reactions_along, reactions_table
 from polypod.solution.actuator_sizing import leg_power, requirements, rms_over_time
 from polypod.solution.solve import CHUNK
-from polypod.summary.facts import summarise
+from polypod.summary.solution_facts import summarise
 from polypod.summary.tables import fixed
 
 NAME = "lu-3spu-2rpu-r"

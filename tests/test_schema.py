@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from polypod.errors import Fault, MechanismError, UnknownNameError, alternatives
-from polypod.files.mechanism_schema import read_spec
+from polypod.files.mechanism_spec import read_spec
 from polypod.files.units import MECHANISM_KINDS, UNITS, cos_sin, from_si, si_unit, to_si
 
 BUILT_IN = Path(__file__).parents[1] / "python/polypod/mechanisms"

@@ -15,7 +15,8 @@ from polypod.plots import _topology_places, fig4_panels
 from polypod.plots.scene import Scene
 from polypod.report.data import data_tables
 from polypod.report.words import actuators_table
-from polypod.summary.facts import describe, summarise
+from polypod.summary.mechanism_facts import describe
+from polypod.summary.solution_facts import summarise
 from polypod.summary.tables import legs_table, motion_table
 
 sys.path.insert(0, str(Path(__file__).parent))

@@ -14,12 +14,13 @@ import numpy as np
 import pytest
 
 import polypod as pp
+from polypod.bodies.palette import rgb
 from polypod.errors import UnknownNameError
 from polypod.viewer import words
 from polypod.viewer.message_filter import is_own_page, is_update, is_value
 from polypod.viewer.model import NEAR_LIMIT, Level, Model
 from polypod.viewer.player import Player, track_of
-from polypod.viewer.scene import SINGULAR, platform_color, rgb
+from polypod.viewer.scene import SINGULAR, platform_color
 from polypod.viewer.server import ViewerError, require_viser
 from polypod.viewer.static import check_static_path, write_static
 from polypod.viewer.worker import SETTLED, Worker

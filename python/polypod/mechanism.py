@@ -7,12 +7,10 @@ import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import tomli_w
 from numpy.typing import ArrayLike, NDArray
 
 from polypod import _core
@@ -60,9 +58,7 @@ from polypod.errors import (
     UnsupportedError,
     alternatives,
 )
-from polypod.files.mechanism_schema import read_spec
 from polypod.files.text import read_text
-from polypod.files.toml_lines import line_of, read_toml
 from polypod.files.units import readable
 
 _AT_REST = np.empty(0)
@@ -79,6 +75,9 @@ class Mechanism:
     def __init__(
         self, data: Mapping[str, Any], *, text: str | None = None, origin: str = "the mechanism"
     ) -> None:
+        # What reads and writes files is imported where it is used: an import of Polypod need not wait for it.
+        from polypod.files.mechanism_spec import read_spec
+
         self._data: dict[str, Any] = _plain(data)
         self._text = text
         spec, faults = read_spec(self._data)
@@ -116,6 +115,8 @@ class Mechanism:
 
         Raises MechanismError with every fault and its place.
         """
+        from polypod.files.toml_lines import read_toml
+
         data = read_toml(text)
         if isinstance(data, Fault):
             raise MechanismError([data], origin)
@@ -132,6 +133,8 @@ class Mechanism:
 
     def to_toml(self) -> str:
         """The file's text: the very text that it was read from, comments included, if it was."""
+        import tomli_w
+
         return tomli_w.dumps(self._data) if self._text is None else self._text
 
     def save(self, path: str | Path) -> None:
@@ -1096,6 +1099,8 @@ def _by_name(names: Sequence[str], rows: Array) -> dict[str, Array]:
 
 def _found(faults: Sequence[Fault], text: str | None) -> list[Fault]:
     """The faults with their lines in the text."""
+    from polypod.files.toml_lines import line_of
+
     return [fault if text is None else replace(fault, line=line_of(text, fault.place)) for fault in faults]
 
 
@@ -1172,4 +1177,6 @@ def load(source: str | Path) -> Mechanism:
 
 
 def _built_in() -> Any:
+    from importlib.resources import files
+
     return files("polypod") / "mechanisms"

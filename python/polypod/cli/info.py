@@ -35,7 +35,7 @@ def info(
 ) -> None:
     """Tell what a mechanism is: freedoms, joints, constraints, coordinates, conditioning, warnings."""
     from polypod.mechanism import load
-    from polypod.summary.facts import describe
+    from polypod.summary.mechanism_facts import describe
 
     mech = load(mechanism)
     facts = describe(mech)

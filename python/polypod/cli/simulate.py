@@ -67,7 +67,7 @@ def simulate(
     from polypod.solution.computed_torque import ComputedTorque
     from polypod.solution.simulate import STOPS
     from polypod.solution.simulate import simulate as run
-    from polypod.summary.facts import summarise
+    from polypod.summary.solution_facts import summarise
 
     check_result_path(result, mechanism)
     mech = load(mechanism)

@@ -55,7 +55,7 @@ def solve(
 
     from polypod.mechanism import load
     from polypod.motion.motion_file import load_motion
-    from polypod.summary.facts import summarise
+    from polypod.summary.solution_facts import summarise
 
     check_result_path(result, mechanism, motion)
     mech = load(mechanism)

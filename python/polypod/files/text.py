@@ -5,10 +5,13 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
-from importlib.resources.abc import Traversable
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from polypod.errors import Fault
+
+if TYPE_CHECKING:
+    from importlib.resources.abc import Traversable
 
 PLACE = "file"
 """The place of faults that concern a file as a whole."""

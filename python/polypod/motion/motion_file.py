@@ -39,7 +39,7 @@ from pydantic import Strict, create_model
 
 from polypod.errors import Fault, MotionError, UnknownNameError, alternatives, shown
 from polypod.files.csv_columns import Column, columns_to_si, read_header, read_numbers, read_rows
-from polypod.files.mechanism_schema import Number, Table, Vector, read_table
+from polypod.files.tables import Number, Table, Vector, read_table
 from polypod.files.text import read_text
 from polypod.files.toml_lines import read_toml
 from polypod.files.units import KIND_OF_COORDINATE, MOTION_KINDS, read_units

@@ -11,7 +11,7 @@ from polypod.answers.mobility import Mobility
 from polypod.bodies.palette import BLUE, GREY, INK
 from polypod.plots.canvas import pyplot_figure
 from polypod.plots.style import house_style
-from polypod.summary.facts import link_kind, links_by_joints
+from polypod.summary.mechanism_facts import link_kind, links_by_joints
 
 _HUBS = (0, 1)  # base and platform come first among the links
 

@@ -18,7 +18,8 @@ from polypod.report.reactions import Reactions, reactions_along
 from polypod.solution.actuator_sizing import requirements
 from polypod.solution.solution import Solution
 from polypod.solution.solve import solve
-from polypod.summary.facts import describe, summarise
+from polypod.summary.mechanism_facts import describe
+from polypod.summary.solution_facts import summarise
 from polypod.workspaces.search import workspace as find_workspace
 from polypod.workspaces.search_region import own_coordinates
 from polypod.workspaces.workspace import Workspace

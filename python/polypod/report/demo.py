@@ -21,7 +21,8 @@ from polypod.report.content import gather
 from polypod.report.page import render, save
 from polypod.solution.solution import Solution
 from polypod.solution.solve import solve
-from polypod.summary.facts import describe, summarise
+from polypod.summary.mechanism_facts import describe
+from polypod.summary.solution_facts import summarise
 
 EXAMPLE = MECHANISM
 """Built-in mechanism, and the motion of the same name."""

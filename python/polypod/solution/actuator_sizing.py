@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from polypod.mechanism import Mechanism
-from polypod.solution.extremes import greatest, least, number
+from polypod.solution.extremes import greatest, least, stroke_limits
 from polypod.solution.solution import Solution
 
 Array = NDArray[np.float64]
@@ -59,12 +59,6 @@ def rms_over_time(time: Array, values: Array) -> float | None:
     if not duration:
         return None
     return float(np.sqrt(np.sum(step * (squares[:-1] + squares[1:]) / 2) / duration))
-
-
-def stroke_limits(mech: Mechanism, leg: int) -> list[float | None]:
-    """Least and greatest length or place of a leg, m; None for no limit, also for a least length of zero."""
-    low, high = mech.stroke[leg]
-    return [number(low) if low != 0.0 or mech.sliders[leg] else None, number(high)]
 
 
 def _peak_and_rms(time: Array, values: Array) -> dict[str, float | None]:

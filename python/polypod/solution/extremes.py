@@ -1,4 +1,4 @@
-"""Numbers that exist: None for NaN and infinity, extremes of those that are finite."""
+"""Numbers that exist: None for NaN and infinity, extremes of those that are finite, limits that are set."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ import math
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+from polypod.mechanism import Mechanism
 
 Array = NDArray[np.float64]
 
@@ -32,3 +34,9 @@ def peak(values: Array) -> float | None:
     """The value of largest magnitude, with its sign."""
     finite = values[np.isfinite(values)]
     return float(finite[np.argmax(np.abs(finite))]) if finite.size else None
+
+
+def stroke_limits(mech: Mechanism, leg: int) -> list[float | None]:
+    """Least and greatest length or place of a leg, m; None for no limit, also for a least length of zero."""
+    low, high = mech.stroke[leg]
+    return [number(low) if low != 0.0 or mech.sliders[leg] else None, number(high)]

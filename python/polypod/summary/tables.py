@@ -1,4 +1,4 @@
-"""The facts of `summary.facts` as tables of words: what the command line prints and the report shows."""
+"""Facts of mechanisms and solutions as tables of words: what the command line prints and the report shows."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class Table:
 
 
 def mechanism_tables(facts: Facts) -> list[Table]:
-    """All tables on the facts of `polypod.summary.facts.describe`, but those without rows."""
+    """All tables on the facts of `describe`, but those without rows."""
     tables = (
         legs_table(facts),
         mobility_table(facts),
@@ -264,7 +264,7 @@ def _of_legs(what: str, names: tuple[str, ...]) -> str:
 
 
 def motion_tables(facts: Facts) -> list[Table]:
-    """The tables on the facts of `polypod.summary.facts.summarise`, but those without rows."""
+    """The tables on the facts of `summarise`, but those without rows."""
     tables = (motion_table(facts), peaks_table(facts), passed_table(facts))
     return [table for table in tables if table.rows]
 
