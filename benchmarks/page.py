@@ -4,7 +4,8 @@ import re
 
 import matplotlib.pyplot as plt
 
-from polypod.style import DASHES, GREY, INK, PALETTE, house_style
+from polypod.bodies.palette import GREY, INK, PALETTE
+from polypod.plots.style import DASHES, house_style
 
 COMPARED = 100_000
 CACHED = 1000

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 import polypod as pp
 from polypod.plots import plot_mechanism
-from polypod.style import house_style
+from polypod.plots.style import house_style
 
 DOCS = Path(__file__).parent
 IMAGES = DOCS / "images" / "catalogue"

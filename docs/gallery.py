@@ -19,8 +19,9 @@ from PIL import Image
 from skimage.measure import marching_cubes
 
 import polypod as pp
+from polypod.bodies.palette import BLUE, GREY, INK, PALE, SKY, VERMILION, color_of
 from polypod.plots import plot_fig4, plot_mechanism, plot_poses, plot_topology, plot_workspace
-from polypod.style import BLUE, GREY, INK, PALE, SKY, VERMILION, color_of, dash_of, house_style
+from polypod.plots.style import dash_of, house_style
 
 Array = NDArray[np.float64]
 
@@ -192,7 +193,7 @@ def modes() -> Figure:
 @picture
 # --8<-- [start:head-tilts]
 def head_tilts() -> Figure:
-    found = mechanism("head").workspace(["rx", "ry"], {"z": 0.56})
+    found = pp.workspace(mechanism("head"), ["rx", "ry"], {"z": 0.56})
     return plot_workspace(found, Figure(figsize=(4.6, 4.6)))
 
 
@@ -202,7 +203,7 @@ def head_tilts() -> Figure:
 @picture
 # --8<-- [start:workspace]
 def workspace() -> Figure:
-    found = pp.load("lu-3spu-2rpu-r").workspace(step=0.02)
+    found = pp.workspace(pp.load("lu-3spu-2rpu-r"), step=0.02)
     return plot_workspace(found, Figure(figsize=(8.0, 7.4)))
 
 
@@ -213,7 +214,7 @@ def workspace() -> Figure:
 # --8<-- [start:slice-of-positions]
 def slice_of_positions() -> Figure:
     mech = pp.load("lu-3spu-2rpu-r")
-    found = mech.workspace(["x", "z"], {"y": 0.15, "alpha": -0.1, "beta": 0.6})
+    found = pp.workspace(mech, ["x", "z"], {"y": 0.15, "alpha": -0.1, "beta": 0.6})
     return plot_workspace(found, Figure(figsize=(5.4, 4.0)))
 
 
@@ -224,7 +225,7 @@ def slice_of_positions() -> Figure:
 # --8<-- [start:slice-of-tilts]
 def slice_of_tilts() -> Figure:
     mech = pp.load("lu-3spu-2rpu-r")
-    found = mech.workspace(["azimuth", "tilt"], {"x": 0.0, "y": 0.1, "z": 0.7})
+    found = pp.workspace(mech, ["azimuth", "tilt"], {"x": 0.0, "y": 0.1, "z": 0.7})
     return plot_workspace(found, Figure(figsize=(5.4, 4.0)))
 
 
@@ -235,7 +236,7 @@ def slice_of_tilts() -> Figure:
 # --8<-- [start:lattice]
 def lattice() -> Figure:
     mech = pp.load("lu-3spu-2rpu-r")
-    stepped, flooded = mech.length_lattice(step=0.02), mech.workspace(step=0.02)
+    stepped, flooded = pp.length_lattice(mech, step=0.02), pp.workspace(mech, step=0.02)
     height = 1e3 * flooded.axes[2]
     figure = Figure(figsize=(9.0, 3.9), layout="constrained")
     with house_style():

@@ -4,8 +4,9 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import polypod as pp
+from polypod.bodies.palette import color_of
 from polypod.plots import save_figure
-from polypod.style import color_of, dash_of, house_style
+from polypod.plots.style import dash_of, house_style
 
 # 1. The mechanism and what it is to follow: the first second of the built-in motion.
 mech = pp.load("lu-3spu-2rpu-r")
@@ -33,7 +34,7 @@ start = mech.pose({**beside, "p": beside["p"] + 0.01, "alpha": beside["alpha"] +
 runs = {}
 for label, known in {"true masses": mech, "masses 20 % too large": wrong}.items():
     law = pp.ComputedTorque(known, motion, frequency=20.0)
-    run = mech.simulate(start, forces=law, until=UNTIL, step=0.01, tolerance=1e-6)
+    run = pp.simulate(mech, start, forces=law, until=UNTIL, step=0.01, tolerance=1e-6)
     print(f"{label}: {run.end['reason']} at {run.end['time']:g} s")
     runs[label] = run.dataset
 

@@ -4,9 +4,10 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import polypod as pp
+from polypod.answers.status import count
+from polypod.bodies.palette import color_of
 from polypod.plots import save_figure
-from polypod.status import count
-from polypod.style import color_of, house_style
+from polypod.plots.style import house_style
 
 mech = pp.load("lu-3spu-2rpu-r")
 still = np.zeros(6)

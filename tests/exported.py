@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 import polypod as pp
-from polypod.bodies import link_frames, links_of
+from polypod.bodies.links import link_frames, links_of
 from polypod.export.shapes import body_name
 from polypod.multibody.tree import describe
 

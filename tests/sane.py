@@ -438,7 +438,7 @@ def text_of(content: bytes) -> str:
     return text.replace("\r\n", "\n").replace("\r", "\n")
 
 
-WHOLE = ("toml", "mechanism")
+WHOLE = ("toml", "file", "mechanism")
 """Places that mean the file itself."""
 
 

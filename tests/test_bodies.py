@@ -10,8 +10,8 @@ import pytest
 import trimesh
 
 import polypod as pp
-from polypod import solids
-from polypod.bodies import link_frames, links_of
+from polypod.bodies import solids
+from polypod.bodies.links import link_frames, links_of
 
 NAME = "lu-3spu-2rpu-r"
 DATA = Path(__file__).parent / "data"

@@ -19,7 +19,7 @@ from scipy.spatial.transform import Rotation
 import polypod as pp
 from polypod import SingularityKind, Status
 from polypod.errors import UnsupportedError
-from polypod.summary import catalogue
+from polypod.summary.mechanism_facts import catalogue
 
 sys.path.insert(0, str(Path(__file__).parent))
 

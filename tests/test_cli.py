@@ -196,7 +196,7 @@ def test_solve_without_any_answer(run, tmp_path):
 
 
 def test_long_work_is_solved_in_parts(run, tmp_path, monkeypatch):
-    monkeypatch.setattr("polypod.solution.CHUNK", 100)
+    monkeypatch.setattr("polypod.solution.solve.CHUNK", 100)
     status, _, err = run("solve", NAME, NAME, "-o", tmp_path / "r.nc")
     assert (status, err) == (0, "")  # not on a terminal: no bar
 
@@ -337,7 +337,8 @@ def test_workspace_as_json_is_that_of_python(run, tmp_path):
     args = ("--vary", "azimuth,tilt", "--fix", "x=0", "--fix", "y=100mm", "--fix", "z=0.7", "--step", "6deg")
     status, out, _ = run("workspace", NAME, *args, "--bounds", "tilt=0:1.2", "-o", path, "--json")
     assert status == 0
-    found = pp.load(NAME).workspace(
+    found = pp.workspace(
+        pp.load(NAME),
         ["azimuth", "tilt"],
         {"x": 0.0, "y": 0.1, "z": 0.7},
         step=np.radians(6),

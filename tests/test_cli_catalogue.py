@@ -57,7 +57,7 @@ def test_new_writes_a_sound_file(run, tmp_path):
 
 def test_every_key_of_the_template_can_be_left_out_where_it_says_so(tmp_path):
     """The tables that are marked optional, and the optional keys of leg 1."""
-    from polypod.starting import starting_text
+    from polypod.cli.templates import starting_text
 
     content = pp.Mechanism.from_toml(starting_text(tmp_path / "m.toml")).to_dict()
     for table in ("platform", "load", "dynamics", "limits"):

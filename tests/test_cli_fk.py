@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import polypod as pp
-from polypod.lengths import load_lengths
+from polypod.solution.poses_of_lengths import load_lengths
 
 NAME = "lu-3spu-2rpu-r"
 DATA = Path(__file__).parent / "data"
@@ -320,7 +320,7 @@ def test_unreadable_lengths(run, tmp_path):
     assert_one_message(run("fk", NAME, tmp_path / "nowhere.csv"), "nowhere.csv", "does not exist")
     assert_one_message(run("fk", NAME, tmp_path), str(tmp_path), "cannot be read")
     (tmp_path / "binary.csv").write_bytes(b"\xff\x00\xfe")
-    assert_one_message(run("fk", NAME, tmp_path / "binary.csv"), "binary.csv", "cannot be read")
+    assert_one_message(run("fk", NAME, tmp_path / "binary.csv"), "binary.csv", "is not UTF-8 text")
 
 
 @pytest.mark.parametrize("result", ["r.nc", "r", "nowhere/r.csv", "lengths.csv"])

@@ -24,7 +24,7 @@ def test_a_fall_ends_at_a_limit(run, tmp_path):
     assert "natural coordinates" in out
     mech = pp.load(NAME)
     pose = mech.pose({"alpha": 0.1, "p": -0.3, "h": 0.7, "beta": 0.7, "gamma": 0.5})
-    found = mech.simulate(pose, until=1.0, step=0.01, tolerance=1e-8)
+    found = pp.simulate(mech, pose, until=1.0, step=0.01, tolerance=1e-8)
     assert pp.load_solution(file) == found
 
 

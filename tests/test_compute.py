@@ -12,7 +12,7 @@ import pytest
 
 import polypod as pp
 from polypod import compute
-from polypod.labelled import Answer
+from polypod.answers.answer import Answer
 
 DATA = Path(__file__).parent / "data"
 NAMES = ["lu-3spu-2rpu-r", DATA / "stewart-gough.toml", DATA / "3-rps.toml"]

@@ -43,7 +43,7 @@ def errors(law, run):
 def test_with_true_masses_errors_are_damped_oscillations(published, damping):
     mech, motion, start = published
     law = pp.ComputedTorque(mech, motion, frequency=20.0, damping=damping)
-    run = mech.simulate(start, forces=law, until=0.3, step=0.02)
+    run = pp.simulate(mech, start, forces=law, until=0.3, step=0.02)
     found, time = errors(law, run), run.dataset.time.values
     rate = -law.damping * 20.0
     # From the error at the start, at rest but for the motion's own first rates, which are zero.
@@ -61,7 +61,7 @@ def test_what_wrong_masses_leave_shrinks_with_the_gain(published):
     left = []
     for frequency in (20.0, 40.0):
         law = pp.ComputedTorque(scaled(mech, 1.2), motion, frequency=frequency)
-        run = mech.simulate(start, forces=law, until=0.8, step=0.2, tolerance=1e-7)
+        run = pp.simulate(mech, start, forces=law, until=0.8, step=0.2, tolerance=1e-7)
         assert run.end["kind"] == "until"
         left.append(np.abs(errors(law, run)[-1]).max())
     assert 1e-4 < left[0] < 1e-2
@@ -97,7 +97,7 @@ def test_passive_legs_are_left_alone():
     law = pp.ComputedTorque(mech, motion, frequency=20.0)
     assert law(0.5, mech.home, np.zeros(6))[6] == 0.0
     beside = mech.pose(still | {"z": z + 0.005})
-    run = mech.simulate(beside, forces=law, until=0.5, step=0.1, tolerance=1e-6)
+    run = pp.simulate(mech, beside, forces=law, until=0.5, step=0.1, tolerance=1e-6)
     assert np.abs(errors(law, run)[-1]).max() < 2e-3 * np.abs(errors(law, run)[0]).max()
 
 

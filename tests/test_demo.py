@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 import polypod as pp
-from polypod.demo import EXAMPLE, run_demo
-from polypod.paper import fit_markdown, fit_table_i, table_i
+from polypod.paper.table_i import fit_markdown, fit_table_i, table_i
+from polypod.report.demo import EXAMPLE, run_demo
 
 
 @pytest.fixture(scope="module")
@@ -97,7 +97,7 @@ def test_the_motion_is_compared_with_another_engine(demo):
 
 
 def test_without_the_engine_the_summary_says_what_to_install(monkeypatch):
-    from polypod.paper_tables import table_iii_markdown
+    from polypod.paper.tables import table_iii_markdown
     from polypod.verify import table
 
     monkeypatch.setattr(table, "find_spec", lambda module: None)

@@ -25,9 +25,9 @@ from pathlib import Path
 import pytest
 
 import polypod as pp
-from polypod.lengths import load_lengths
-from polypod.schema import read_spec
-from polypod.solution import VARIABLES
+from polypod.files.mechanism_spec import read_spec
+from polypod.solution.poses_of_lengths import load_lengths
+from polypod.solution.solve import VARIABLES
 
 sys.path.insert(0, str(Path(__file__).parent))
 

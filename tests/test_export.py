@@ -16,12 +16,12 @@ import trimesh
 from scipy.io import loadmat
 
 import polypod as pp
-from polypod.bodies import link_frames, links_of
+from polypod.bodies.links import link_frames, links_of
 from polypod.export import FORMATS, export
-from polypod.export.gltf import Y_UP
 from polypod.export.model import LIGHT, THIN, Model
 from polypod.export.names import Names, legal
-from polypod.solution import states_along
+from polypod.files.glb import Y_UP
+from polypod.solution.solve import states_along
 
 sys.path.insert(0, str(Path(__file__).parent))
 from exported import LU, mechanism, nasty, regular_pose

@@ -15,7 +15,7 @@ import trimesh
 import yaml
 
 import polypod as pp
-from polypod.bodies import links_of
+from polypod.bodies.links import links_of
 from polypod.export import export
 from polypod.export.mjcf import STEP, holding_forces
 from polypod.export.model import Model

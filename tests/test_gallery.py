@@ -12,7 +12,7 @@ import pytest
 from PIL import Image
 
 import polypod as pp
-from polypod.bodies import link_frames, links_of
+from polypod.bodies.links import link_frames, links_of
 
 sys.path.insert(0, str(Path(__file__).parent))
 

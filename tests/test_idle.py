@@ -427,23 +427,23 @@ def test_regressor_and_base_parameters(name: str) -> None:
 
 
 def test_lattices_and_computed_torque_are_refused() -> None:
-    from polypod.control import ComputedTorque
+    from polypod.solution.computed_torque import ComputedTorque
 
     mech = MECHANISMS["pentapod-5-ups"]
     with pytest.raises(UnsupportedError, match="spin"):
-        mech.length_lattice(step=0.1)
+        pp.length_lattice(mech, step=0.1)
     with pytest.raises(UnsupportedError, match="idle freedom"):
         ComputedTorque(mech, None, frequency=10.0)  # type: ignore[arg-type]
 
 
 def test_workspace_and_simulation_work() -> None:
     mech = MECHANISMS["pentapod-5-ups"]
-    found = mech.workspace(["x", "y"], {"z": 0.52, "rx": 0.0, "ry": 0.0, "rz": 0.0}, step=0.04)
+    found = pp.workspace(mech, ["x", "y"], {"z": 0.52, "rx": 0.0, "ry": 0.0, "rz": 0.0}, step=0.04)
     assert found.mask.any()
     # A rod that spins goes on spinning: nothing brakes it.
     hold = mech.inverse_dynamics(mech.home, np.zeros(6), np.zeros(6)).forces
     twist = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 30.0])
-    run = mech.simulate(mech.home, twist, forces=hold, until=0.05, step=0.01)
+    run = pp.simulate(mech, mech.home, twist, forces=hold, until=0.05, step=0.01)
     turned = run.dataset["twist"].to_numpy()
     assert abs(turned[:, 5] - 30.0).max() < 1e-6
     assert abs(turned[:, :3]).max() < 1e-6

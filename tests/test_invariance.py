@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation
 
 import polypod as pp
 from polypod import Status
-from polypod.units import from_si
+from polypod.files.units import from_si
 
 Array = NDArray[np.float64]
 Tables = dict[str, Any]

@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 
 import polypod as pp
-from polypod.answers import Answer
+from polypod.answers.answer import Answer
+from polypod.answers.notebook import MOST_NUMBERS, MOST_ROWS, numbers, rows_of
+from polypod.answers.variables import FURTHER, VARIABLES, variable
 from polypod.errors import ShapeError
-from polypod.notebook import MOST_NUMBERS, MOST_ROWS, numbers, rows_of
-from polypod.solution import states_along
-from polypod.variables import FURTHER, VARIABLES, variable
+from polypod.solution.solve import states_along
 
 DATA = Path(__file__).parent / "data"
 MECHANISMS = {"lu-3spu-2rpu-r": "lu-3spu-2rpu-r"} | {file.stem: file for file in DATA.glob("*.toml")}
@@ -315,8 +315,8 @@ def test_texts_of_a_file_are_escaped():
         pp.solve(mech, motion),
         mech.inverse_kinematics(mech.home),
         mech.limits(mech.home),
-        mech.workspace(step=0.2),
-        mech.length_lattice(step=0.1),
+        pp.workspace(mech, step=0.2),
+        pp.length_lattice(mech, step=0.1),
     )
     for result in shown:
         page = result._repr_html_()
@@ -349,8 +349,8 @@ def test_solutions_show_themselves(lu):
     assert rows[0] == ["leg", "leg length r / m", "leg rate v_r / m/s", "active force of the leg f_a / N"]
     force = solution.dataset.force.sel(leg="2").values
     assert rows[2][3] == numbers(force)
-    fall = lu.simulate(
-        lu.pose({"alpha": 0.1, "p": -0.3, "h": 0.7, "beta": 0.7, "gamma": 0.5}), until=1.0, step=0.01
+    fall = pp.simulate(
+        lu, lu.pose({"alpha": 0.1, "p": -0.3, "h": 0.7, "beta": 0.7, "gamma": 0.5}), until=1.0, step=0.01
     )
     assert "stroke max of leg 3" in "".join(read(fall).texts)
     assert "OUT_OF_STROKE" in repr(fall) or "OK" in repr(fall)
@@ -365,15 +365,15 @@ def test_solutions_of_other_datasets_show_themselves():
 
 
 def test_workspaces_and_lattices_show_themselves(lu):
-    found = lu.workspace(step=0.1)
+    found = pp.workspace(lu, step=0.1)
     assert repr(found).startswith("<Workspace of lu-3spu-2rpu-r; reachable x, y, z: volume 0.2")
     rows = read(found).rows
     low, high = 1e3 * found.extents[0]
     assert rows[1] == ["x", f"{low:.1f} mm", f"{high:.1f} mm", f"{high - low:.1f} mm"]
-    tilts = lu.workspace(["azimuth", "tilt"], {"x": 0.0, "y": 0.1, "z": 0.7}, step=0.2)
+    tilts = pp.workspace(lu, ["azimuth", "tilt"], {"x": 0.0, "y": 0.1, "z": 0.7}, step=0.2)
     assert "slice azimuth, tilt at x = 0.0 mm, y = 100.0 mm, z = 700.0 mm: area" in repr(tilts)
     read(tilts)
-    lattice = lu.length_lattice(step=0.1)
+    lattice = pp.length_lattice(lu, step=0.1)
     assert f"{lattice.inside} of {lattice.nodes} combinations inside" in repr(lattice)
     data = lattice.to_xarray()
     assert np.array_equal(data.extents, lattice.extents)

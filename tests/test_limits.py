@@ -20,7 +20,7 @@ from scipy.spatial.transform import Rotation
 
 import polypod as pp
 from polypod import Status
-from polypod.summary import summarise
+from polypod.summary.solution_facts import summarise
 
 sys.path.insert(0, str(Path(__file__).parent))
 import oracle as o

@@ -6,7 +6,7 @@ import pytest
 
 import polypod as pp
 from polypod.errors import Fault, MechanismError
-from polypod.lines import line_of
+from polypod.files.toml_lines import line_of
 
 BUILT_IN = "exechon"
 

@@ -13,7 +13,8 @@ import tomli_w
 from numpy.polynomial import Polynomial
 
 from polypod.errors import MotionError, ShapeError, UnknownNameError
-from polypod.motion import Array, Motion, load_motion, minimum_jerk, quintic
+from polypod.motion.motion import Array, Motion, minimum_jerk, quintic
+from polypod.motion.motion_file import load_motion
 
 SETS = {
     "paper": ("x", "y", "z", "alpha", "beta"),
@@ -425,7 +426,7 @@ def test_files_that_cannot_be_read(write: Write, tmp_path: Path) -> None:
     assert faults(tmp_path / "none.csv") == ["file: does not exist"]
     assert "line 1" in faults(write("a.toml", "= 3"))[0]
     (tmp_path / "b.csv").write_bytes(b"\xff\xfe\x00")
-    assert faults(tmp_path / "b.csv")[0].startswith("file: cannot be read: 'utf-8'")
+    assert faults(tmp_path / "b.csv")[0].startswith("file: is not UTF-8 text: 'utf-8'")
     (tmp_path / "c.csv").mkdir()
     assert faults(tmp_path / "c.csv")[0].startswith("file: cannot be read")
 

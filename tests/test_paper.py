@@ -9,7 +9,7 @@ import pytest
 from scipy.optimize import least_squares
 
 import polypod as pp
-from polypod.paper import TABLE_I, fit_markdown, fit_table_i, table_i
+from polypod.paper.table_i import TABLE_I, fit_markdown, fit_table_i, table_i
 
 PAGE = Path(__file__).parent.parent / "docs" / "paper.md"
 CORNERS = np.radians([18.0, 90.0, 162.0, 234.0, 306.0])

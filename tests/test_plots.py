@@ -16,9 +16,9 @@ from matplotlib.figure import Figure
 
 import polypod as pp
 from polypod import plots
+from polypod.bodies.palette import PALETTE
 from polypod.errors import PolypodError, ShapeError
-from polypod.scene import Scene
-from polypod.style import PALETTE
+from polypod.plots.scene import Scene
 
 NAME = "lu-3spu-2rpu-r"
 FILES = [NAME, *sorted(str(path) for path in (Path(__file__).parent / "data").glob("*.toml"))]
@@ -265,7 +265,7 @@ def test_palette_is_distinct():
 
 def test_four_views_of_a_workspace_and_an_outline(tmp_path):
     mech = pp.load("lu-3spu-2rpu-r")
-    solid = plots.plot_workspace(mech.workspace(step=0.08), Figure(figsize=(8.0, 7.4)))
+    solid = plots.plot_workspace(pp.workspace(mech, step=0.08), Figure(figsize=(8.0, 7.4)))
     titles = [ax.get_title(loc="left") for ax in solid.axes]
     assert titles == ["(a)  top view", "(b)  side view", "(c)  front view", "(d)  isometric view"]
     top, side, front, _ = solid.axes
@@ -274,7 +274,7 @@ def test_four_views_of_a_workspace_and_an_outline(tmp_path):
     assert front.get_ylabel() == "$Z_o$ / mm"
     names = [text.get_text() for text in solid.legends[0].get_texts()]
     assert {f"stroke {end} of leg {leg}" for end in ("min", "max") for leg in range(1, 6)} <= {*names}
-    outline = mech.workspace(["azimuth", "tilt"], {"x": 0.0, "y": 0.1, "z": 0.7}, step=0.1)
+    outline = pp.workspace(mech, ["azimuth", "tilt"], {"x": 0.0, "y": 0.1, "z": 0.7}, step=0.1)
     flat = plots.plot_workspace(outline, Figure(figsize=(5.6, 5.2)))
     assert flat.axes[0].get_ylabel() == "tilt / deg"
     assert flat.axes[0].get_ylim()[1] == pytest.approx(55.7, abs=5.0)
@@ -290,10 +290,10 @@ SIZE, DPI = (8, 6), 50
 def drawing(what, mech, solution):
     """A function that draws on a figure or on a part of one."""
     if what == "workspace":
-        found = mech.workspace(step=0.12)
+        found = pp.workspace(mech, step=0.12)
         return lambda canvas: plots.plot_workspace(found, canvas)
     if what == "outline":
-        flat = mech.workspace(["azimuth", "tilt"], {"x": 0.0, "y": 0.1, "z": 0.7}, step=0.2)
+        flat = pp.workspace(mech, ["azimuth", "tilt"], {"x": 0.0, "y": 0.1, "z": 0.7}, step=0.2)
         return lambda canvas: plots.plot_workspace(flat, canvas)
     if what == "mechanism":
         return lambda canvas: plots.plot_mechanism(mech, ax=canvas.add_axes((0, 0, 1, 1), projection="3d"))

@@ -531,12 +531,12 @@ def test_limits_of_forces_hold_for_the_least_ones() -> None:
 
 def test_a_lattice_of_lengths_is_refused() -> None:
     with pytest.raises(UnsupportedError, match="contradict one another"):
-        MECHANISMS["4ups-up"].length_lattice(step=0.1)
+        pp.length_lattice(MECHANISMS["4ups-up"], step=0.1)
 
 
 def test_computed_torque_is_refused() -> None:
     mech = MECHANISMS["4-rpr"]
-    from polypod.control import ComputedTorque
+    from polypod.solution.computed_torque import ComputedTorque
 
     with pytest.raises(UnsupportedError, match="redundant legs"):
         ComputedTorque(mech, None, frequency=10.0)  # type: ignore[arg-type]
@@ -544,16 +544,16 @@ def test_computed_torque_is_refused() -> None:
 
 def test_workspaces_of_poses_work() -> None:
     mech = MECHANISMS["4-rpr"]
-    found = mech.workspace(["x", "y"], {"rz": 0.0}, step=0.01, keep_aspect=True)
+    found = pp.workspace(mech, ["x", "y"], {"rz": 0.0}, step=0.01, keep_aspect=True)
     assert found.mask.any()
-    reach = MECHANISMS["4ups-up"].workspace(step=0.08)
+    reach = pp.workspace(MECHANISMS["4ups-up"], step=0.08)
     assert reach.volume > 0.0
 
 
 def test_simulation_and_solution_run() -> None:
     mech = MECHANISMS["4ups-up"]
     hold = mech.inverse_dynamics(mech.home, np.zeros(6), np.zeros(6)).forces
-    rest = mech.simulate(mech.home, forces=hold, until=0.05, step=0.01)
+    rest = pp.simulate(mech, mech.home, forces=hold, until=0.05, step=0.01)
     assert abs(rest.dataset["twist"].to_numpy()).max() < 1e-6
     assert rest.end["kind"] == "until"
 

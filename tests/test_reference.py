@@ -17,9 +17,9 @@ from typing import Any
 import pytest
 
 import polypod as pp
-from polypod.derivatives import InverseDynamicsDerivatives
-from polypod.labelled import Answer
-from polypod.variables import variable
+from polypod.answers.answer import Answer
+from polypod.answers.derivatives import InverseDynamicsDerivatives
+from polypod.answers.variables import variable
 
 sys.path.insert(0, str(Path(__file__).parent))
 
@@ -116,7 +116,7 @@ RECORDS = {
     name: thing
     for name, thing in documented().items()
     if dataclasses.is_dataclass(thing)
-    and (issubclass(thing, Answer) or thing.__module__ == "polypod.answers")
+    and (issubclass(thing, Answer) or thing.__module__.startswith("polypod.answers."))
 }
 ANSWERS = {name: kind for name, kind in RECORDS.items() if issubclass(kind, Answer) and kind is not Answer}
 

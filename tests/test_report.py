@@ -13,13 +13,13 @@ import numpy as np
 import pytest
 
 import polypod as pp
-from polypod.actuators import leg_power, requirements, rms_over_time
 from polypod.report.decimate import POINTS, kept, spans
 from polypod.report.formulas import to_html
 from polypod.report.reactions import reactions_along, reactions_table
-from polypod.solution import CHUNK
-from polypod.summary import summarise
-from polypod.tables import fixed
+from polypod.solution.actuator_sizing import leg_power, requirements, rms_over_time
+from polypod.solution.solve import CHUNK
+from polypod.summary.solution_facts import summarise
+from polypod.summary.tables import fixed
 
 NAME = "lu-3spu-2rpu-r"
 ROOT = Path(__file__).parents[1]
@@ -246,11 +246,11 @@ def test_a_report_without_motion(name):
 
 def test_a_slice_in_a_report_is_told_as_one(mech):
     """Angles are not drawn in space, as if they were lengths."""
-    tilts = mech.workspace(["azimuth", "tilt"], {"x": 0.0, "y": 0.1, "z": 0.7}, step=0.2)
+    tilts = pp.workspace(mech, ["azimuth", "tilt"], {"x": 0.0, "y": 0.1, "z": 0.7}, step=0.2)
     html = pp.report_html(mech, workspace=tilts)
     assert "All values that azimuth and tilt can take together inside all limits at x = 0.0 mm" in html
     assert 'id="space"' not in html
-    reach = mech.workspace(["x", "y", "z"], {"alpha": 0.1, "beta": 0.6}, step=0.1)
+    reach = pp.workspace(mech, ["x", "y", "z"], {"alpha": 0.1, "beta": 0.6}, step=0.1)
     assert 'id="space"' in pp.report_html(mech, workspace=reach)
 
 
@@ -328,7 +328,7 @@ def test_inputs_are_there_in_full(mech):
 
 def test_a_simulation_has_a_report(mech):
     pose = mech.pose({"alpha": 0.1, "p": -0.3, "h": 0.7, "beta": 0.7, "gamma": 0.5})
-    html = pp.report_html(mech, mech.simulate(pose, until=0.05, step=0.01), workspace=False)
+    html = pp.report_html(mech, pp.simulate(mech, pose, until=0.05, step=0.01), workspace=False)
     assert "A solution was given" in html
 
 

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import polypod as pp
-from polypod.actuators import requirements
 from polypod.report.decimate import POINTS
+from polypod.solution.actuator_sizing import requirements
 
 NAME = "lu-3spu-2rpu-r"
 DATA = Path(__file__).parent / "data"

@@ -8,7 +8,7 @@ import pytest
 import xarray as xr
 
 from polypod.errors import SolutionError
-from polypod.results import Solution, load_solution
+from polypod.solution.solution import Solution, load_solution
 
 SUFFIXES = (".nc", ".csv")
 

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from polypod.errors import Fault, MechanismError, UnknownNameError, alternatives
-from polypod.schema import read_spec
-from polypod.units import MECHANISM_KINDS, UNITS, cos_sin, from_si, si_unit, to_si
+from polypod.files.mechanism_spec import read_spec
+from polypod.files.units import MECHANISM_KINDS, UNITS, cos_sin, from_si, si_unit, to_si
 
 BUILT_IN = Path(__file__).parents[1] / "python/polypod/mechanisms"
 DATA = Path(__file__).parent / "data"

@@ -18,9 +18,9 @@ from matplotlib.figure import Figure
 
 import polypod as pp
 from polypod import plots
+from polypod.bodies.palette import PALETTE
 from polypod.errors import PolypodError, UnknownNameError, WorkspaceError
-from polypod.series import math_symbols, math_unit
-from polypod.style import PALETTE
+from polypod.plots.series import math_symbols, math_unit
 
 NAME = "lu-3spu-2rpu-r"
 
@@ -52,12 +52,12 @@ def solution(mech):
 
 @pytest.fixture(scope="module")
 def reach(mech):
-    return mech.workspace(step=0.1)
+    return pp.workspace(mech, step=0.1)
 
 
 @pytest.fixture(scope="module")
 def tilts(mech):
-    return mech.workspace(["azimuth", "tilt"], {"x": 0.0, "y": 0.1, "z": 0.7}, step=0.2)
+    return pp.workspace(mech, ["azimuth", "tilt"], {"x": 0.0, "y": 0.1, "z": 0.7}, step=0.2)
 
 
 def curves(ax):

@@ -77,7 +77,7 @@ def swinging():
 def test_a_free_platform_goes_straight_and_turns_evenly():
     mech = bare("stewart-gough")
     V = np.array([0.02, -0.03, 0.05, 0.0, 0.0, 0.4])
-    data = mech.simulate(mech.home, V, until=0.5, step=0.05, stop=()).dataset
+    data = pp.simulate(mech, mech.home, V, until=0.5, step=0.05, stop=()).dataset
     time = data.time.values
     assert np.allclose(data.pose.values[:, :3, 3], mech.home[:3, 3] + np.outer(time, V[:3]), atol=1e-12)
     turned = np.stack([o.turn(np.array([0.0, 0.0, 0.4 * s])) for s in time]) @ mech.home[:3, :3]
@@ -99,7 +99,7 @@ def test_the_forces_of_a_motion_give_the_motion(name):
         return mech.inverse_dynamics(s.pose, s.twist, s.acceleration).forces[0]
 
     start = state(0.0)
-    found = mech.simulate(start.pose[0], start.twist[0], forces=forces, until=0.25, step=0.05, stop=())
+    found = pp.simulate(mech, start.pose[0], start.twist[0], forces=forces, until=0.25, step=0.05, stop=())
     data = found.dataset
     assert found.end["kind"] == "until"
     for k, time in enumerate(data.time.values):
@@ -116,7 +116,7 @@ def test_motions_stay_on_the_constraints(name):
     c = t.any_case(name)
     springs, _ = sprung(c.mech, c.T[0], 3000.0)
     forces = springs if np.isfinite(springs(0, c.T[0], REST)).all() else None
-    found = c.mech.simulate(c.T[0], 0.3 * c.twist[0], forces=forces, until=0.3, step=0.02, stop=())
+    found = pp.simulate(c.mech, c.T[0], 0.3 * c.twist[0], forces=forces, until=0.3, step=0.02, stop=())
     data = found.dataset
     assert len(data.time) > 3
     assert constraint_errors(c.mech, c.spec, data.pose.values).max() < ON
@@ -132,8 +132,8 @@ def test_energy_drifts_at_the_order_of_the_integrator():
     drifts = []
     steps = (0.04, 0.02, 0.01)
     for step in steps:
-        data = mech.simulate(
-            start.pose, start.twist, forces=forces, until=4.0, step=step, tolerance=1.0, stop=()
+        data = pp.simulate(
+            mech, start.pose, start.twist, forces=forces, until=4.0, step=step, tolerance=1.0, stop=()
         ).dataset
         energy = total_energy(data, of_springs)
         drifts.append(np.abs(energy - energy[0]).max())
@@ -141,7 +141,7 @@ def test_energy_drifts_at_the_order_of_the_integrator():
     slopes = np.diff(np.log(drifts)) / np.diff(np.log(steps))
     assert (slopes > 8.0).all(), slopes
     assert (slopes < 10.0).all(), slopes
-    close = mech.simulate(start.pose, start.twist, forces=forces, until=4.0, step=0.04, stop=()).dataset
+    close = pp.simulate(mech, start.pose, start.twist, forces=forces, until=4.0, step=0.04, stop=()).dataset
     assert np.ptp(total_energy(close, of_springs)) < 1e-8
 
 
@@ -150,8 +150,8 @@ def test_no_drift_over_a_hundred_thousand_steps():
     mech, start, forces, of_springs = swinging()
     steps, step = 100_000, 0.01
     spec = o.read(pp.load(t.DATA / "3-rps.toml").to_dict())
-    found = mech.simulate(
-        start.pose, start.twist, forces=forces, until=steps * step, step=step, tolerance=1.0, stop=()
+    found = pp.simulate(
+        mech, start.pose, start.twist, forces=forces, until=steps * step, step=step, tolerance=1.0, stop=()
     )
     data = found.dataset
     assert (found.end["kind"], len(data.time)) == ("until", steps + 1)
@@ -171,8 +171,8 @@ def test_forces_and_loads_in_all_forms():
     load = np.array([1.0, -2.0, 3.0, 0.1, 0.2, -0.3])
 
     def last(forces, wrench):
-        found = mech.simulate(
-            start.pose, start.twist, forces=forces, wrench=wrench, until=0.1, step=0.05, stop=()
+        found = pp.simulate(
+            mech, start.pose, start.twist, forces=forces, wrench=wrench, until=0.1, step=0.05, stop=()
         )
         return found.dataset.isel(time=-1)
 
@@ -187,8 +187,8 @@ def test_forces_and_loads_in_all_forms():
     rising = last(lambda time, pose, twist: 20 * time * hold, load)
     assert np.allclose(ramp.pose, rising.pose, atol=1e-12)
     assert np.allclose(ramp.force, 2 * hold)
-    turned = mech.simulate(
-        start.pose, start.twist, wrench=load, wrench_axes="platform", until=0.1, step=0.1, stop=()
+    turned = pp.simulate(
+        mech, start.pose, start.twist, wrench=load, wrench_axes="platform", until=0.1, step=0.1, stop=()
     ).dataset
     R = start.pose[:3, :3]
     same = mech.forward_dynamics(start.pose, start.twist, [0, 0, 0], [*(R @ load[:3]), *(R @ load[3:])])
@@ -198,8 +198,14 @@ def test_forces_and_loads_in_all_forms():
 def test_the_result_is_a_solution(tmp_path):
     mech, start, forces, _ = swinging()
     seen = []
-    found = mech.simulate(
-        start.pose, start.twist, forces=forces, until=0.1, step=0.03, progress=lambda *at: seen.append(at)
+    found = pp.simulate(
+        mech,
+        start.pose,
+        start.twist,
+        forces=forces,
+        until=0.1,
+        step=0.03,
+        progress=lambda *at: seen.append(at),
     )
     assert found.dataset.time.values.tolist() == [0.0, 0.03, 0.06, 0.09, 0.1]
     assert found.end == {"time": 0.1, "kind": "until", "reason": "the time is over"}
@@ -222,7 +228,7 @@ def test_the_result_is_a_solution(tmp_path):
 def test_the_end_of_a_stroke_at_its_time():
     mech = bare("stewart-gough")
     speed = 0.25
-    found = mech.simulate(mech.home, [0, 0, speed, 0, 0, 0], until=10.0, step=0.1)
+    found = pp.simulate(mech, mech.home, [0, 0, speed, 0, 0, 0], until=10.0, step=0.1)
     leg = mech.inverse_kinematics(mech.home).vectors[0]
     most = mech.stroke[0, 1]
     time = (np.sqrt(most**2 - leg[0] ** 2 - leg[1] ** 2) - leg[2]) / speed
@@ -235,15 +241,15 @@ def test_the_end_of_a_stroke_at_its_time():
     assert len(data.time) == int(time / 0.1) + 2
     # From there it may go back, but no farther.
     at = data.isel(time=-1)
-    assert mech.simulate(at.pose, -at.twist, until=0.1, step=0.1).end["kind"] == "until"
-    beyond = mech.simulate(at.pose, at.twist, until=0.1, step=0.01).end
+    assert pp.simulate(mech, at.pose, -at.twist, until=0.1, step=0.1).end["kind"] == "until"
+    beyond = pp.simulate(mech, at.pose, at.twist, until=0.1, step=0.01).end
     assert (beyond["kind"], beyond["time"] < 1e-6) == ("limit", True)
 
 
 def test_a_limit_passed_at_the_start():
     mech = bare("stewart-gough")
     high = mech.pose({"x": 0, "y": 0, "z": 1.4, "rx": 0, "ry": 0, "rz": 0})
-    found = mech.simulate(high, until=1.0, step=0.1)
+    found = pp.simulate(mech, high, until=1.0, step=0.1)
     assert (found.end["time"], found.end["kind"], len(found.dataset.time)) == (0.0, "limit", 1)
     assert "at the start" in found.end["reason"]
 
@@ -268,11 +274,11 @@ def test_a_singular_pose_at_its_time():
     mech = bare("stewart-gough")
     time, _ = singular_turn(mech, 2.0)
     V = [0, 0, 0, 0, 0, 2.0]
-    found = mech.simulate(mech.home, V, until=3.0, step=0.1, stop=["singularity"])
+    found = pp.simulate(mech, mech.home, V, until=3.0, step=0.1, stop=["singularity"])
     assert found.end["kind"] == "singularity"
     assert found.end["time"] == pytest.approx(time, abs=TIMED)
     assert found.dataset.sigma_min[-1] < 1e-8
-    passing = mech.simulate(mech.home, V, until=time + 0.2, step=0.1, stop=())
+    passing = pp.simulate(mech, mech.home, V, until=time + 0.2, step=0.1, stop=())
     assert passing.end["kind"] == "until"
     assert np.allclose(passing.dataset.twist, V, atol=1e-9)
     assert passing.singularities["crossings"][0]["time"] == pytest.approx(time, abs=1e-3)
@@ -281,7 +287,7 @@ def test_a_singular_pose_at_its_time():
 def test_a_floor_of_conditioning():
     mech = bare("stewart-gough")
     floor = 0.5 * float(mech.conditioning(mech.home).sigma_min)
-    found = mech.simulate(mech.home, [0, 0, 0, 0, 0, 2.0], until=3.0, step=0.1, stop=(), sigma_min=floor)
+    found = pp.simulate(mech, mech.home, [0, 0, 0, 0, 0, 2.0], until=3.0, step=0.1, stop=(), sigma_min=floor)
     assert found.end["kind"] == "conditioning"
     assert found.dataset.sigma_min[-1] == pytest.approx(floor, abs=1e-10)
     assert (found.dataset.sigma_min[:-1] > floor).all()
@@ -297,7 +303,7 @@ def test_a_limit_of_forces():
     def forces(time, pose, twist):
         return np.full(6, 20.0 if time < 0.0123 else 60.0)
 
-    end = mech.simulate(mech.home, forces=forces, until=1.0, step=0.01).end
+    end = pp.simulate(mech, mech.home, forces=forces, until=1.0, step=0.01).end
     assert end["kind"] == "limit"
     assert end["reason"].startswith("force max of leg")
     assert end["time"] == pytest.approx(0.0123, abs=1e-6)
@@ -309,7 +315,7 @@ def test_a_law_without_answer_ends_it():
     def broken(time, pose, twist):
         return forces(time, pose, twist) if time < 0.05 else np.full(3, np.nan)
 
-    found = mech.simulate(start.pose, start.twist, forces=broken, until=1.0, step=0.01)
+    found = pp.simulate(mech, start.pose, start.twist, forces=broken, until=1.0, step=0.01)
     assert found.end["kind"] == "no answer"
     assert found.end["time"] == pytest.approx(0.05, abs=1e-6)
 
@@ -320,18 +326,18 @@ def test_wrong_calls():
     off = start.pose.copy()
     off[0, 3] += 0.01
     with pytest.raises(pp.PolypodError, match="breaks a constraint"):
-        mech.simulate(off, **more)
+        pp.simulate(mech, off, **more)
     with pytest.raises(pp.ShapeError, match=r"forces has the shape \(2,\); needs \(3,\)"):
-        mech.simulate(start.pose, forces=[1, 2], **more)
+        pp.simulate(mech, start.pose, forces=[1, 2], **more)
     with pytest.raises(pp.ShapeError, match=r"forces at 0 s has the shape \(\); needs \(3,\)"):
-        mech.simulate(start.pose, forces=lambda time, pose, twist: 0.0, **more)
+        pp.simulate(mech, start.pose, forces=lambda time, pose, twist: 0.0, **more)
     with pytest.raises(pp.ShapeError, match=r"pose has the shape \(1, 4, 4\)"):
-        mech.simulate(start.pose[None], **more)
+        pp.simulate(mech, start.pose[None], **more)
     with pytest.raises(pp.PolypodError, match="times must increase"):
-        mech.simulate(start.pose, forces=([0.0, 0.0], np.zeros((2, 3))), **more)
+        pp.simulate(mech, start.pose, forces=([0.0, 0.0], np.zeros((2, 3))), **more)
     with pytest.raises(pp.PolypodError, match="step is 0"):
-        mech.simulate(start.pose, until=1.0, step=0)
+        pp.simulate(mech, start.pose, until=1.0, step=0)
     with pytest.raises(pp.UnknownNameError, match="limits"):
-        mech.simulate(start.pose, stop=["limit"], **more)
+        pp.simulate(mech, start.pose, stop=["limit"], **more)
     with pytest.raises(pp.UnknownNameError, match="platform"):
-        mech.simulate(start.pose, wrench_axes="tool", **more)
+        pp.simulate(mech, start.pose, wrench_axes="tool", **more)

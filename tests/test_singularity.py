@@ -13,7 +13,7 @@ import pytest
 
 import polypod as pp
 from polypod import Motion, SingularityKind, Status, _core
-from polypod.passages import find_passages, warnings_of
+from polypod.solution.singularity_crossings import find_passages, warnings_of
 
 sys.path.insert(0, str(Path(__file__).parent))
 import oracle as o

@@ -9,14 +9,15 @@ import numpy as np
 import pytest
 
 import polypod as pp
-from polypod import drives
-from polypod.bodies import link_frames, links_of
+from polypod.answers import leg_words
+from polypod.bodies.links import link_frames, links_of
 from polypod.plots import _topology_places, fig4_panels
+from polypod.plots.scene import Scene
 from polypod.report.data import data_tables
 from polypod.report.words import actuators_table
-from polypod.scene import Scene
-from polypod.summary import describe, summarise
-from polypod.tables import legs_table, motion_table
+from polypod.summary.mechanism_facts import describe
+from polypod.summary.solution_facts import summarise
+from polypod.summary.tables import legs_table, motion_table
 
 sys.path.insert(0, str(Path(__file__).parent))
 
@@ -115,9 +116,9 @@ def test_the_topology_has_a_column_for_each_leg(mech):
 
 
 def test_words():
-    assert drives.word(["UPS", "SPS"]) == "length"
-    assert drives.word(["PUS"]) == "place"
-    assert drives.words(["PUS", "UPU"]) == "lengths and places"
+    assert leg_words.word(["UPS", "SPS"]) == "length"
+    assert leg_words.word(["PUS"]) == "place"
+    assert leg_words.words(["PUS", "UPU"]) == "lengths and places"
 
 
 def test_tables_say_place():
@@ -156,7 +157,7 @@ def test_curves_say_place():
 
 def test_the_page_moves_carriages():
     pytest.importorskip("viser")
-    from polypod.viewer.state import Model
+    from polypod.viewer.model import Model
 
     mech = pp.load("hexaglide")
     model = Model(mech)
@@ -174,7 +175,7 @@ def test_the_page_moves_carriages():
 
 
 def refusal_of_a_passive_leg():
-    from polypod.viewer.state import Model
+    from polypod.viewer.model import Model
 
     model = Model(sliders.mechanism("mixed"))
     model.set_length(6, 0.7)
@@ -182,7 +183,7 @@ def refusal_of_a_passive_leg():
 
 
 def test_the_workspace_of_a_slider_is_bounded_by_its_rail():
-    from polypod.regions import position_bounds
+    from polypod.workspaces.search_region import position_bounds
 
     mech = pp.load("3-prs")
     box = position_bounds(mech)
@@ -193,7 +194,7 @@ def test_the_workspace_of_a_slider_is_bounded_by_its_rail():
     assert np.isfinite(box).all()
     # The rails lie in a plane, and home is above it.
     assert box[2, 0] == 0.0
-    found = pp.load("hexaglide").workspace(step=0.15)
+    found = pp.workspace(pp.load("hexaglide"), step=0.15)
     assert found.volume > 0.0
     inside = found.vertices
     assert np.all((inside > box[:, 0] - 0.15) & (inside < box[:, 1] + 0.15))
@@ -201,7 +202,7 @@ def test_the_workspace_of_a_slider_is_bounded_by_its_rail():
 
 def test_a_lattice_of_lengths_is_of_telescopic_legs():
     with pytest.raises(pp.UnsupportedError, match="legs 1, 2, 3 are sliders"):
-        pp.load("3-prs").length_lattice(step=0.04)
+        pp.length_lattice(pp.load("3-prs"), step=0.04)
 
 
 def test_datasets_say_what_they_hold():

@@ -10,7 +10,8 @@ import xarray as xr
 from numpy.typing import NDArray
 
 import polypod as pp
-from polypod import Motion, Status, solution
+from polypod import Motion, Status
+from polypod.solution import solve
 
 Array = NDArray[np.float64]
 
@@ -187,7 +188,7 @@ def test_pieces_make_the_same_whole(chunk: int, which: str, monkeypatch: pytest.
         motion = Motion.through(TIME, tool, set="tool")
     whole = pp.solve(LU, motion)
     seen: list[tuple[int, int]] = []
-    monkeypatch.setattr(solution, "CHUNK", chunk)
+    monkeypatch.setattr(solve, "CHUNK", chunk)
     assert pp.solve(LU, motion, progress=lambda *count: seen.append(count)) == whole
     assert seen == [(min(end, 201), 201) for end in range(chunk, 201 + chunk, chunk)]
 

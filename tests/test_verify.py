@@ -11,10 +11,11 @@ import numpy as np
 import pytest
 
 import polypod as pp
-from polypod.multibody.placement import BASE, PLATFORM, inverse
+from polypod.multibody.placement import BASE, PLATFORM
 from polypod.multibody.tree import depth_first, describe, joint_values, release
+from polypod.vectors import inverse
 from polypod.verify import table, verify, verify_states
-from polypod.verify.report import as_markdown
+from polypod.verify.verdict import as_markdown
 
 pin = pytest.importorskip("pinocchio")
 

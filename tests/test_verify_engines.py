@@ -12,10 +12,11 @@ import numpy as np
 import pytest
 
 import polypod as pp
-from polypod.multibody.placement import PLATFORM, turned
+from polypod.multibody.placement import PLATFORM
 from polypod.multibody.tree import describe
+from polypod.vectors import turned
 from polypod.verify import integrate, table, verify_states
-from polypod.verify.rows import Links, Square, jacobian, redundant, residual, rows_of
+from polypod.verify.constraints import Links, Square, jacobian, redundant, residual, rows_of
 
 pytest.importorskip("exudyn")
 pytest.importorskip("mujoco")

@@ -14,13 +14,14 @@ import numpy as np
 import pytest
 
 import polypod as pp
+from polypod.bodies.palette import rgb
 from polypod.errors import UnknownNameError
 from polypod.viewer import words
-from polypod.viewer.guard import is_own_page, is_update, is_value
+from polypod.viewer.message_filter import is_own_page, is_update, is_value
+from polypod.viewer.model import NEAR_LIMIT, Level, Model
 from polypod.viewer.player import Player, track_of
-from polypod.viewer.scene import SINGULAR, platform_color, rgb
+from polypod.viewer.scene import SINGULAR, platform_color
 from polypod.viewer.server import ViewerError, require_viser
-from polypod.viewer.state import NEAR_LIMIT, Level, Model
 from polypod.viewer.static import check_static_path, write_static
 from polypod.viewer.worker import SETTLED, Worker
 
@@ -416,7 +417,7 @@ def test_pages_of_other_sites_are_not_served():
 
 def test_importing_polypod_does_not_import_viser():
     code = (
-        "import sys, polypod, polypod.plots, polypod.cli, polypod.viewer.state, polypod.viewer.words, "
+        "import sys, polypod, polypod.plots, polypod.cli, polypod.viewer.model, polypod.viewer.html, "
         "polypod.viewer.server, polypod.viewer.static; sys.exit('viser' in sys.modules)"
     )
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

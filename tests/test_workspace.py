@@ -12,9 +12,9 @@ import trimesh
 from scipy import ndimage
 
 import polypod as pp
-from polypod.boundary import Cuts, coarsened, content, content_with_error, open_edges, surface
-from polypod.section4 import PRINTED, section4, widths_above
-from polypod.workspace import EDGE_OF_GRID, NO_POSE, SINGULARITY
+from polypod.paper.section4 import PRINTED, section4, widths_above
+from polypod.workspaces.boundary import Cuts, coarsened, content, content_with_error, open_edges, surface
+from polypod.workspaces.workspace import EDGE_OF_GRID, NO_POSE, SINGULARITY
 
 NAME = "lu-3spu-2rpu-r"
 DATA = Path(__file__).parent / "data"
@@ -37,17 +37,17 @@ def hexapod():
 
 @pytest.fixture(scope="module")
 def reachable(lu):
-    return lu.workspace(step=0.04)
+    return pp.workspace(lu, step=0.04)
 
 
 @pytest.fixture(scope="module")
 def aspect(lu):
-    return lu.workspace(step=0.05, keep_aspect=True)
+    return pp.workspace(lu, step=0.05, keep_aspect=True)
 
 
 @pytest.fixture(scope="module")
 def upright(hexapod):
-    return hexapod.workspace(["x", "y", "z"], UPRIGHT, step=0.02)
+    return pp.workspace(hexapod, ["x", "y", "z"], UPRIGHT, step=0.02)
 
 
 def digest(workspace) -> str:
@@ -178,7 +178,7 @@ def test_within_one_aspect_it_ends_at_limits_and_singularities(lu, aspect):
 
 
 def test_an_aspect_is_a_part(lu, aspect):
-    whole = lu.workspace(step=0.05, start=np.array(aspect.inputs["start"]))
+    whole = pp.workspace(lu, step=0.05, start=np.array(aspect.inputs["start"]))
     # Neighbours lead to other rotations when singularities stop none: some places are found by one way only.
     assert (aspect.mask & ~whole.mask).sum() <= 0.02 * aspect.mask.sum()
     assert aspect.volume < whole.volume
@@ -196,8 +196,8 @@ def coned(hexapod):
 def test_both_ways_agree_within_the_coarser_step(lu, hexapod, aspect, kind, step):
     """Positions and leg lengths in one aspect: the same extents up to the step of positions or of lengths."""
     mech = {"lu": lu, "hexapod": hexapod}.get(kind) or coned(hexapod)
-    flood = aspect if kind == "lu" else mech.workspace(step=0.03, keep_aspect=True)
-    lattice = mech.length_lattice(step=step, start=np.array(flood.inputs["start"]))
+    flood = aspect if kind == "lu" else pp.workspace(mech, step=0.03, keep_aspect=True)
+    lattice = pp.length_lattice(mech, step=step, start=np.array(flood.inputs["start"]))
     coarser = max(step, flood.inputs["step"]["x"])
     assert np.abs(lattice.extents - flood.extents).max() < coarser
     assert (lattice.at_limits > 0) == (kind != "hexapod")  # cones, or the base plane
@@ -208,7 +208,7 @@ def test_both_ways_agree_within_the_coarser_step(lu, hexapod, aspect, kind, step
 
 def test_a_lattice_has_all_poses_of_its_aspect(lu):
     """Against all assembly modes at all nodes: those with the start's sign of det J, above the base plane."""
-    lattice = lu.length_lattice(step=0.1)
+    lattice = pp.length_lattice(lu, step=0.1)
     sign = np.sign(lu.determinant(np.array(lattice.inputs["start"])).determinant)
     lengths = np.array(list(itertools.product([0.65, 0.75, 0.85], repeat=5)))
     poses = lu.assembly_modes(lengths).pose
@@ -220,13 +220,13 @@ def test_a_lattice_has_all_poses_of_its_aspect(lu):
 
 def test_a_lattice_keeps_to_its_bounds(lu):
     bounds = {"y": (-0.2, 0.3), "z": (0.6, 0.75)}
-    lattice = lu.length_lattice(step=0.05, bounds=bounds)
+    lattice = pp.length_lattice(lu, step=0.05, bounds=bounds)
     for name, (low, high) in bounds.items():
         least, greatest = lattice.extents["xyz".index(name)]
         assert low <= least < low + 0.02
         assert high - 0.02 < greatest <= high
     with pytest.raises(pp.CoordinateError, match="bounds: 'alpha'"):
-        lu.length_lattice(bounds={"alpha": (0.0, 1.0)})
+        pp.length_lattice(lu, bounds={"alpha": (0.0, 1.0)})
 
 
 # --- closed form --------------------------------------------------------------------------------------------
@@ -261,7 +261,7 @@ def test_constant_orientation_is_the_meet_of_six_shells(hexapod, upright):
 def test_orientation_changes_the_shells(hexapod):
     """The same with a turn: centres B_i - R m_i."""
     angle = 0.3
-    found = hexapod.workspace(["x", "y", "z"], {"rx": 0.0, "ry": 0.0, "rz": angle}, step=0.05)
+    found = pp.workspace(hexapod, ["x", "y", "z"], {"rx": 0.0, "ry": 0.0, "rz": angle}, step=0.05)
     c, s = np.cos(angle), np.sin(angle)
     turn = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
     places = np.stack(np.meshgrid(*found.axes, indexing="ij"), axis=-1).reshape(-1, 3)
@@ -277,9 +277,9 @@ def test_orientation_changes_the_shells(hexapod):
 def test_the_error_estimate_shrinks_and_covers_the_finer_volume(lu, hexapod, kind):
     steps = (0.08, 0.04, 0.02)
     if kind == "reachable":
-        found = [lu.workspace(step=step) for step in steps]
+        found = [pp.workspace(lu, step=step) for step in steps]
     else:
-        found = [hexapod.workspace(["x", "y", "z"], UPRIGHT, step=step) for step in steps]
+        found = [pp.workspace(hexapod, ["x", "y", "z"], UPRIGHT, step=step) for step in steps]
     for coarse, fine in itertools.pairwise(found):
         assert fine.volume_error < coarse.volume_error
         assert abs(fine.volume - coarse.volume) < coarse.volume_error
@@ -291,7 +291,7 @@ def test_the_error_estimate_shrinks_and_covers_the_finer_volume(lu, hexapod, kin
 def test_tilt_and_torsion_of_six_freedoms(hexapod):
     """R = Rz(azimuth) Ry(tilt) Rz(torsion - azimuth), Bonev and Gosselin 2002; a threefold symmetry."""
     at = {"x": 0.0, "y": 0.0, "z": 0.6}
-    found = hexapod.workspace(["azimuth", "tilt", "torsion"], at, step=0.15)
+    found = pp.workspace(hexapod, ["azimuth", "tilt", "torsion"], at, step=0.15)
     assert found.volume_unit == "rad^3"
     rng = np.random.default_rng(2)
     for i in rng.choice(len(found.vertices), 20, replace=False):
@@ -315,7 +315,7 @@ def test_tilt_and_torsion_of_six_freedoms(hexapod):
 
 def test_orientation_at_a_point_in_the_papers_angles(lu):
     at = {"x": 0.0, "y": 0.1, "z": 0.7}
-    found = lu.workspace(["alpha", "beta"], at)
+    found = pp.workspace(lu, ["alpha", "beta"], at)
     limits = lu.limits(found.poses)
     assert limits.margins.min() >= -EXACT
     on_limit = found.labels < len(limits.names)
@@ -324,14 +324,15 @@ def test_orientation_at_a_point_in_the_papers_angles(lu):
     assert no_pose.any()  # beyond |cos γ| = 1
     assert np.abs(np.sin(lu.coordinates(found.poses[no_pose], "paper")["gamma"])).max() < 1e-3
     assert EDGE_OF_GRID not in found.shares
-    other = lu.workspace(["alpha", "beta"], at, branch=-1)
+    other = pp.workspace(lu, ["alpha", "beta"], at, branch=-1)
     assert not np.array_equal(found.extents, other.extents)
 
 
 def test_a_slice_starts_where_it_is_told(lu):
     start = lu.pose({"x": 0.0, "y": 0.1, "z": 0.7, "alpha": -0.02, "beta": 0.7})
     assert lu.limits(start).within
-    found = lu.workspace(
+    found = pp.workspace(
+        lu,
         ["alpha", "beta"],
         {"x": 0.0, "y": 0.1, "z": 0.7},
         start=start,
@@ -344,8 +345,8 @@ def test_a_slice_starts_where_it_is_told(lu):
 
 def test_a_slice_keeps_one_sign_of_the_determinant(lu):
     fixed = {"x": 0.1, "y": 0.1, "z": 0.68}
-    both = lu.workspace(["alpha", "beta"], fixed)
-    one = lu.workspace(["alpha", "beta"], fixed, keep_aspect=True)
+    both = pp.workspace(lu, ["alpha", "beta"], fixed)
+    one = pp.workspace(lu, ["alpha", "beta"], fixed, keep_aspect=True)
     assert len(np.unique(np.sign(lu.determinant(both.poses).determinant))) == 2
     assert len(np.unique(np.sign(lu.determinant(one.poses).determinant))) == 1
     singular = one.poses[one.labels == one.label_names.index(SINGULARITY)]
@@ -354,8 +355,8 @@ def test_a_slice_keeps_one_sign_of_the_determinant(lu):
 
 
 def test_a_floor_of_conditioning_is_kept_and_binds(lu):
-    free = lu.workspace(step=0.08)
-    found = lu.workspace(step=0.08, sigma_min=0.02)
+    free = pp.workspace(lu, step=0.08)
+    found = pp.workspace(lu, step=0.08, sigma_min=0.02)
     assert found.volume < free.volume
     assert np.nanmin(lu.conditioning(found.poses).sigma_min) > 0.02 - EXACT
     binding = [i for i, name in enumerate(found.label_names) if "conditioning" in name]
@@ -369,13 +370,13 @@ def test_a_floor_of_conditioning_is_kept_and_binds(lu):
 
 @pytest.mark.parametrize("keep_aspect", [False, True])
 def test_threads_change_no_bit(lu, keep_aspect):
-    one, two = (lu.workspace(step=0.06, keep_aspect=keep_aspect, threads=n) for n in (1, 2))
+    one, two = (pp.workspace(lu, step=0.06, keep_aspect=keep_aspect, threads=n) for n in (1, 2))
     assert digest(one) == digest(two)
     assert one == two
 
 
 def test_threads_change_no_bit_of_the_lattice(lu):
-    one, two = (lu.length_lattice(step=0.04, threads=n) for n in (1, 2))
+    one, two = (pp.length_lattice(lu, step=0.04, threads=n) for n in (1, 2))
     assert one.extents.tobytes() == two.extents.tobytes()
     assert one.profile.tobytes() == two.profile.tobytes()
     for count in ("inside", "poses", "at_limits", "singular"):
@@ -385,7 +386,7 @@ def test_threads_change_no_bit_of_the_lattice(lu):
 @pytest.mark.slow
 def test_a_million_nodes_are_the_same_with_one_thread(lu):
     bounds = {"x": (-0.75, 0.75), "y": (-0.75, 0.75), "z": (0.0, 1.0)}
-    one, all = (lu.workspace(step=0.0131, bounds=bounds, threads=n) for n in (1, 0))
+    one, all = (pp.workspace(lu, step=0.0131, bounds=bounds, threads=n) for n in (1, 0))
     assert one.mask.size > 1_000_000
     assert digest(one) == digest(all)
 
@@ -425,7 +426,7 @@ def test_section4_with_the_papers_own_step(lu):
 
 
 def test_netcdf_loads_back_equal(upright, reachable, lu, tmp_path):
-    flat = lu.workspace(["azimuth", "tilt"], {"x": 0.0, "y": 0.1, "z": 0.7}, step=0.1)
+    flat = pp.workspace(lu, ["azimuth", "tilt"], {"x": 0.0, "y": 0.1, "z": 0.7}, step=0.1)
     for found in (upright, reachable, flat):
         found.save(tmp_path / "w.nc")
         back = pp.load_workspace(tmp_path / "w.nc")
@@ -470,7 +471,7 @@ def test_scenes_load_back(reachable, tmp_path):
 
 
 def test_scenes_are_for_positions(tmp_path):
-    from polypod.workspace import check_suffix
+    from polypod.workspaces.workspace import check_suffix
 
     check_suffix(tmp_path / "w.glb", ["x", "y", "z"])
     with pytest.raises(pp.WorkspaceError, match="not z, alpha, beta"):
@@ -513,7 +514,7 @@ def test_a_start_is_found_where_home_is_outside_the_limits(lu):
         leg["stroke"] = {"min": 650.0, "max": 700.0}
     short = pp.Mechanism.from_dict(data)
     assert not short.limits(short.home).within
-    found = short.workspace(step=0.04)
+    found = pp.workspace(short, step=0.04)
     assert short.limits(np.array(found.inputs["start"])).within
     assert found.mask.any()
 
@@ -525,14 +526,14 @@ def test_a_start_with_an_aspect_is_not_nearly_singular(lu, aspect):
 
 def test_no_start_is_found_where_no_pose_is(hexapod):
     with pytest.raises(pp.WorkspaceError, match="no pose of stewart-gough inside all limits"):
-        hexapod.workspace(step=0.02, bounds={"z": (1.1, 1.14)})
+        pp.workspace(hexapod, step=0.02, bounds={"z": (1.1, 1.14)})
 
 
 def test_bounds_hold_the_workspace(lu, hexapod, reachable):
     for name, (low, high) in reachable.inputs["bounds"].items():
         least, greatest = reachable.extents["xyz".index(name)]
         assert low <= least < greatest <= high
-    small = lu.workspace(step=0.04, bounds={"x": (-0.1, 0.1), "y": (-0.1, 0.1), "z": (0.6, 0.8)})
+    small = pp.workspace(lu, step=0.04, bounds={"x": (-0.1, 0.1), "y": (-0.1, 0.1), "z": (0.6, 0.8)})
     assert np.allclose(small.extents[:2], [[-0.1, 0.1], [-0.1, 0.1]])
     assert 0.6 <= small.extents[2, 0] < small.extents[2, 1] <= 0.8
     assert small.shares[EDGE_OF_GRID] > 0.3
@@ -540,7 +541,7 @@ def test_bounds_hold_the_workspace(lu, hexapod, reachable):
 
 def test_progress_is_told(lu):
     told = []
-    found = lu.workspace(step=0.08, progress=lambda done, of: told.append((done, of)))
+    found = pp.workspace(lu, step=0.08, progress=lambda done, of: told.append((done, of)))
     assert told == sorted(told)
     assert told[-1] == (found.mask.sum(), found.mask.size)
 
@@ -578,28 +579,28 @@ FIX = {"rx": 0.0, "ry": 0.0, "rz": 0.0}
 )  # fmt: skip
 def test_wrong_calls_say_what_is_wrong(hexapod, arguments, error, message):
     with pytest.raises(error, match=message):
-        hexapod.workspace(**arguments)
+        pp.workspace(hexapod, **arguments)
 
 
 def test_a_start_that_the_slice_does_not_hold(hexapod):
     start = hexapod.home
     with pytest.raises(pp.WorkspaceError, match=r"start: x = 0, y = 0, z = 0.6 is outside the bounds"):
-        hexapod.workspace(["x", "y", "z"], UPRIGHT, start=start, step=0.05, bounds={"z": (0.65, 0.8)})
+        pp.workspace(hexapod, ["x", "y", "z"], UPRIGHT, start=start, step=0.05, bounds={"z": (0.65, 0.8)})
     with pytest.raises(pp.WorkspaceError, match=r"start: the node next to .* is not inside all limits"):
-        hexapod.workspace(["x", "y", "z"], UPRIGHT | {"rz": 1.5}, start=start, step=0.05)
+        pp.workspace(hexapod, ["x", "y", "z"], UPRIGHT | {"rz": 1.5}, start=start, step=0.05)
     with pytest.raises(pp.WorkspaceError, match=r"start: o is at .* outside the bounds"):
-        hexapod.workspace(start=start, step=0.05, bounds={"z": (0.65, 0.8)})
+        pp.workspace(hexapod, start=start, step=0.05, bounds={"z": (0.65, 0.8)})
 
 
 def test_the_lattice_needs_strokes(lu, hexapod):
     data = lu.to_dict()
     del data["legs"][1]["stroke"]
     with pytest.raises(pp.UnsupportedError, match=r"legs\.2\.stroke"):
-        pp.Mechanism.from_dict(data).length_lattice()
+        pp.length_lattice(pp.Mechanism.from_dict(data))
     with pytest.raises(pp.WorkspaceError, match="step is 0"):
-        lu.length_lattice(step=0)
+        pp.length_lattice(lu, step=0)
     with pytest.raises(pp.WorkspaceError, match="at most 1e"):
-        lu.length_lattice(step=1e-4)
+        pp.length_lattice(lu, step=1e-4)
 
 
 def test_a_mechanism_without_strokes_needs_bounds(hexapod):
@@ -608,9 +609,9 @@ def test_a_mechanism_without_strokes_needs_bounds(hexapod):
         del leg["stroke"]
     free = pp.Mechanism.from_dict(data)
     with pytest.raises(pp.WorkspaceError, match=r"bounds\.x: .* has no strokes"):
-        free.workspace(step=0.1)
+        pp.workspace(free, step=0.1)
     bounds = dict.fromkeys("xy", (-0.2, 0.2)) | {"z": (0.5, 0.7)}
-    found = free.workspace(step=0.1, bounds=bounds)
+    found = pp.workspace(free, step=0.1, bounds=bounds)
     assert found.mask.all()
     assert found.shares == {EDGE_OF_GRID: 1.0}
     assert found.volume < 0.4 * 0.4 * 0.2  # corners are cut
@@ -618,5 +619,8 @@ def test_a_mechanism_without_strokes_needs_bounds(hexapod):
 
 def test_where_o_does_not_move_freely_a_slice_is_named():
     with pytest.raises(pp.WorkspaceError, match="or a slice over z, rx, ry"):
-        pp.load(DATA / "3-rps.toml").workspace()
-    assert pp.load(DATA / "3-rps.toml").workspace(["z", "rx", "ry"], step={"rx": 0.1, "ry": 0.1}).volume > 0.1
+        pp.workspace(pp.load(DATA / "3-rps.toml"))
+    assert (
+        pp.workspace(pp.load(DATA / "3-rps.toml"), ["z", "rx", "ry"], step={"rx": 0.1, "ry": 0.1}).volume
+        > 0.1
+    )

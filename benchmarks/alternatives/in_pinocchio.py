@@ -9,7 +9,7 @@ inverse dynamics carried to the platform, and the solve for active forces and mu
 import numpy as np
 import pinocchio as pin
 
-from polypod.multibody.placement import cross
+from polypod.vectors import cross
 from polypod.multibody.tree import describe, release
 from polypod.verify.pinocchio import Tree
 

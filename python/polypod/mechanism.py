@@ -7,55 +7,38 @@ import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
-from importlib.resources import files
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
-import tomli_w
 from numpy.typing import ArrayLike, NDArray
 
 from polypod import _core
-from polypod.answers import (
-    AssemblyModes,
-    Conditioning,
+from polypod.answers.derivatives import BaseParameters, InverseDynamicsDerivatives, Regressor
+from polypod.answers.dynamics import (
     CoupledForces,
     EquationsOfMotion,
     ForwardDynamics,
-    ForwardKinematics,
-    GraphJoint,
-    GraphLink,
-    IdleFreedom,
     InverseDynamics,
-    InverseKinematics,
-    Joint,
     JointReactions,
+    Power,
+)
+from polypod.answers.kinematics import (
+    AssemblyModes,
+    ForwardKinematics,
+    InverseKinematics,
     Kinematics,
-    Limit,
-    Limits,
-    Mobility,
     PlatformAcceleration,
     PlatformTwist,
-    Power,
-    Published,
     State,
 )
-from polypod.arrays import MOTION, MOVING, POSE, Arguments, Array, Loaded, common, doubles, spread
-from polypod.derivatives import BaseParameters, InverseDynamicsDerivatives, Regressor
-from polypod.errors import (
-    CoordinateError,
-    Fault,
-    MechanismError,
-    PolypodError,
-    UnknownNameError,
-    UnsupportedError,
-    WorkspaceError,
-    alternatives,
-)
-from polypod.lines import line_of, read_toml
-from polypod.schema import read_spec
-from polypod.screws import Screws, constraint_screws, freedom_screws
-from polypod.singularity import (
+from polypod.answers.leg_words import word
+from polypod.answers.limits import Conditioning, Limits
+from polypod.answers.mobility import GraphJoint, GraphLink, IdleFreedom, Mobility, Published
+from polypod.answers.notebook import card, picture_of, rows_of
+from polypod.answers.parts import Joint, Limit
+from polypod.answers.screws import Row, Screws
+from polypod.answers.singularity import (
     NEAR_SINGULAR,
     TOLERANCE,
     Determinant,
@@ -64,14 +47,19 @@ from polypod.singularity import (
     SingularityKind,
     codes,
 )
-from polypod.status import Status
-from polypod.units import readable
-
-if TYPE_CHECKING:
-    from polypod.lattice import LengthLattice
-    from polypod.results import Solution
-    from polypod.simulation import Input
-    from polypod.workspace import Workspace
+from polypod.answers.status import Status
+from polypod.arrays import MOTION, MOVING, POSE, Arguments, Array, Loaded, common, doubles, spread
+from polypod.errors import (
+    CoordinateError,
+    Fault,
+    MechanismError,
+    PolypodError,
+    UnknownNameError,
+    UnsupportedError,
+    alternatives,
+)
+from polypod.files.text import read_text
+from polypod.files.units import readable
 
 _AT_REST = np.empty(0)
 """Twists or accelerations of states that are all at rest."""
@@ -87,6 +75,9 @@ class Mechanism:
     def __init__(
         self, data: Mapping[str, Any], *, text: str | None = None, origin: str = "the mechanism"
     ) -> None:
+        # What reads and writes files is imported where it is used: an import of Polypod need not wait for it.
+        from polypod.files.mechanism_spec import read_spec
+
         self._data: dict[str, Any] = _plain(data)
         self._text = text
         spec, faults = read_spec(self._data)
@@ -124,6 +115,8 @@ class Mechanism:
 
         Raises MechanismError with every fault and its place.
         """
+        from polypod.files.toml_lines import read_toml
+
         data = read_toml(text)
         if isinstance(data, Fault):
             raise MechanismError([data], origin)
@@ -140,6 +133,8 @@ class Mechanism:
 
     def to_toml(self) -> str:
         """The file's text: the very text that it was read from, comments included, if it was."""
+        import tomli_w
+
         return tomli_w.dumps(self._data) if self._text is None else self._text
 
     def save(self, path: str | Path) -> None:
@@ -158,9 +153,28 @@ class Mechanism:
         return f"<Mechanism {self.name}: {'+'.join(self.leg_letters)}, {self.dof} freedoms>"
 
     def _repr_html_(self) -> str:
-        from polypod.cards import of_mechanism
-
-        return of_mechanism(self)
+        """Drawing, freedoms, legs and warnings."""
+        file, home = self.to_dict(), self.inverse_kinematics(self.home).lengths
+        legs = zip(self.leg_names, self.leg_letters, self.actuated, home, self.stroke, strict=True)
+        rows = [
+            (name, letters, "yes" if actuated else "no", readable(length, "m"), _stroke(*stroke))
+            for name, letters, actuated, length, stroke in legs
+        ]
+        headers = ("leg", "joints", "actuated", f"{word(self.leg_letters)} at home", "stroke")
+        sets = [(name, ", ".join(names)) for name, names in self.coordinate_sets.items()]
+        said = f"{'+'.join(self.leg_letters)}, {self.dof} freedoms"
+        notes = [
+            file.get("description", ""),
+            file.get("source", ""),
+            *(f"⚠ {text}" for text in self.warnings),
+        ]
+        return card(
+            self.name,
+            said,
+            [rows_of(headers, rows), rows_of(("coordinate set", "coordinates"), sets, texts=2)],
+            notes=filter(None, notes),
+            picture=picture_of(self),
+        )
 
     # --- what it is --------------------------------------------------------------------------------------
 
@@ -568,7 +582,7 @@ class Mechanism:
         >>> free.pitch.round(9) + 0.0, free.axis[0].round(9) + 0.0
         (array([inf,  0.,  0.]), array([0., 0., 1.]))
         """
-        return freedom_screws(self, pose)
+        return self._screws(pose, self._core.freedom_screws)
 
     def constraint_screws(self, pose: ArrayLike) -> Screws:
         """The wrench of every constraint at a pose with its line [T66].
@@ -583,7 +597,13 @@ class Mechanism:
         >>> mech.constraint_screws(mech.home).pitch  # couples: turns are held
         array([inf, inf, inf])
         """
-        return constraint_screws(self, pose)
+        return self._screws(pose, self._core.constraint_screws)
+
+    def _screws(self, pose: ArrayLike, of: Callable[[Array], list[Row] | None]) -> Screws:
+        """Of one pose where every leg has a direction."""
+        matrix = doubles("pose", pose, (4, 4), batch=False)
+        status = Status(int(self.singularity(matrix).status))
+        return Screws.of(of(matrix) if status is Status.OK else [], status)
 
     def singularity_distance(
         self,
@@ -618,10 +638,7 @@ class Mechanism:
         (-2.829, 2.823)
         """
         set, named = self._varied_coordinates(set, coordinates)
-        if reach is None:
-            from polypod.drives import spans
-
-            reach = float(spans(self).max())
+        reach = float(spans(self).max()) if reach is None else reach
         (poses,) = POSE(pose)
         names, out = self._core.nearest_singular(
             poses, set, named, self._length(length), _positive("reach", reach)
@@ -731,122 +748,6 @@ class Mechanism:
         batch = lengths.shape[:-1]
         modes = {name: a.reshape(batch + a.shape[1:]) for name, a in padded.items()}
         return AssemblyModes(self, **modes, number=count.reshape(batch), status=status.reshape(batch))
-
-    # --- workspace ---------------------------------------------------------------------------------------
-
-    def workspace(
-        self,
-        vary: Sequence[str] | None = None,
-        fix: Mapping[str, float] | None = None,
-        *,
-        step: float | Mapping[str, float] | None = None,
-        bounds: Mapping[str, Sequence[float]] | None = None,
-        start: ArrayLike | None = None,
-        branch: int = +1,
-        keep_aspect: bool = False,
-        sigma_min: float | None = None,
-        threads: int = 0,
-        progress: Callable[[int, int], None] | None = None,
-    ) -> Workspace:
-        """The reachable workspace [T39, T40], or with `vary` a slice of the pose space [T42].
-
-        The reachable workspace is the set of positions of o that can be reached from a start pose inside all
-        limits, whatever the orientation. It is found in steps from neighbour to neighbour: what is found can
-        be reached; what would need a rotation far from all those nearby may be missing.
-
-        A slice varies two or three coordinates over fixed others: x, y, z over given angles are the
-        constant-orientation workspace, angles over a given position the orientation workspace. The names
-        are those of one coordinate set; or x, y, z of the tool tip with azimuth, tilt and (six freedoms)
-        torsion of the tool axis. It holds the connected part with the start, else the largest.
-
-        Args:
-            vary: two or three coordinates; without them the reachable workspace.
-            fix: values of the others that the coordinate set takes, m and rad.
-            step: width of the grid's cells, m or rad; for a slice also one for each coordinate. By default
-                the widest bounds have 64 cells; those of a slice have 60 each, or 200 in two dimensions.
-            bounds: least and greatest value by name. By default positions that the strokes allow, on the side
-                of the base joints where home is, and full turns.
-            start: pose (4, 4) inside all limits; by default one found from home. A slice takes from it the
-                component, the aspect and the branch of dependent coordinates.
-            branch: as for `state`; slices only.
-            keep_aspect: only what is reached without a change of the sign of det J.
-            sigma_min: a floor for the smallest singular value: the dexterous workspace.
-            threads: 0 for those of `set_threads`; reachable workspace only. No result depends on it.
-            progress: called with the number of nodes done and of all.
-
-        Raises:
-            WorkspaceError: bounds, step or start that are wrong, and where nothing is found.
-            CoordinateError: names that make up no coordinate set.
-
-        >>> import polypod as pp
-        >>> mech = pp.load("lu-3spu-2rpu-r")
-        >>> found = mech.workspace(step=0.1)
-        >>> found.volume_unit, abs(found.volume - 0.34) < found.volume_error
-        ('m^3', True)
-        >>> tilts = mech.workspace(["azimuth", "tilt"], {"x": 0.0, "y": 0.1, "z": 0.7}, step=0.1)
-        >>> tilts.mask.shape
-        (63, 31)
-        """
-        from polypod.reachable import reachable
-        from polypod.slices import sliced
-
-        given: dict[str, Any] = {
-            "step": step,
-            "bounds": bounds,
-            "start": start,
-            "keep_aspect": keep_aspect,
-            "sigma_min": sigma_min,
-            "progress": progress,
-        }
-        if vary is not None:
-            return sliced(self, vary, fix, branch=branch, **given)
-        if fix:
-            raise WorkspaceError(f"fix.{next(iter(fix))}: needs coordinates that vary; give vary, too")
-        return reachable(self, threads=threads, **given)
-
-    def length_lattice(
-        self,
-        *,
-        step: float | None = None,
-        layer: float | None = None,
-        bounds: Mapping[str, Sequence[float]] | None = None,
-        start: ArrayLike | None = None,
-        sigma_min: float | None = None,
-        threads: int = 0,
-        progress: Callable[[int, int], None] | None = None,
-    ) -> LengthLattice:
-        """Positions of o for all combinations of leg lengths in one aspect [T41].
-
-        The way of the paper's Section 4: every actuated leg takes lengths from the least to the greatest of
-        its stroke, and forward kinematics continues from each combination to the next, as far as limits,
-        bounds and singularities let it. An aspect may hold several poses with the same lengths: all count.
-
-        Args:
-            step: of the lengths, m; a tenth of the shortest stroke by default.
-            layer: height of the layers of z for which widths are kept, m; `step` by default.
-            bounds: of o, least and greatest of x, y, z, m; what the legs reach by default, on the side of the
-                base where home is.
-            start: pose (4, 4) whose aspect is meant; by default a well conditioned one found from home.
-            sigma_min: a floor for the smallest singular value.
-            threads: 0 for those of `set_threads`. The result does not depend on it.
-            progress: called with the number of nodes reached and of all.
-
-        Raises:
-            UnsupportedError: an actuated leg without a stroke, or not as many of them as freedoms.
-            WorkspaceError: a step or start that is wrong.
-        """
-        from polypod.lattice import length_lattice
-
-        return length_lattice(
-            self,
-            step=step,
-            layer=layer,
-            bounds=bounds,
-            start=start,
-            sigma_min=sigma_min,
-            threads=threads,
-            progress=progress,
-        )
 
     # --- dynamics ----------------------------------------------------------------------------------------
 
@@ -1014,72 +915,6 @@ class Mechanism:
         """Energies and every power of their balance [T17]. Arguments as for `inverse_dynamics`."""
         args = MOTION.loaded(wrench, wrench_axes, pose, twist, acceleration)
         return Power(self, **self._core.power(*args))
-
-    def simulate(
-        self,
-        pose: ArrayLike,
-        twist: ArrayLike = (0.0,) * 6,
-        *,
-        forces: Input | None = None,
-        wrench: Input | None = None,
-        wrench_axes: str = "base",
-        until: float,
-        step: float,
-        tolerance: float = 1e-10,
-        stop: Sequence[str] = ("limits", "singularity"),
-        sigma_min: float | None = None,
-        progress: Callable[[float, float], None] | None = None,
-    ) -> Solution:
-        """The motion from a state under forces: integration over time on the constraints [T53, T54].
-
-        Args:
-            pose: (4, 4), at time 0.
-            twist: (6,), at time 0; at rest by default.
-            forces: active forces (n,), N, positive when they push the platform away: constant; or a pair of
-                times (k,) and rows (k, n), linear in between; or a function of time, pose (4, 4) and twist
-                (6,), without memory, because trial states are asked for, too. None for no forces.
-            wrench: load on the platform at o, (6,), N and N m, in the same three forms; the mechanism's own
-                by default.
-            wrench_axes: the axes of `wrench`, "base" or "platform".
-            until: the last time, s.
-            step: between the states of the result, and the longest step of the integration, s.
-            tolerance: of the integration, relative, for each of its steps.
-            stop: what ends the motion before: "limits", any limit of `limit_list`; "singularity", a change of
-                the sign of det J.
-            sigma_min: the smallest singular value below which the motion ends, too.
-            progress: called with the time that is reached and the last one.
-
-        Returns:
-            A `Solution` like that of `solve`, with `end`: the time, kind and reason of the end. The last
-            state is the one at which it ends, with its time to the accuracy of the integration.
-
-        Raises:
-            PolypodError: a state to start from that the mechanism cannot have, or numbers that are wrong.
-            ShapeError: forces, load, pose or twist of another shape.
-
-        >>> import polypod as pp
-        >>> mech = pp.load("lu-3spu-2rpu-r")
-        >>> pose = mech.pose({"alpha": 0.1, "p": -0.3, "h": 0.7, "beta": 0.7, "gamma": 0.5})
-        >>> fall = mech.simulate(pose, until=1.0, step=0.01)
-        >>> fall.end["kind"], round(fall.end["time"], 3), fall.end["reason"]
-        ('limit', 0.083, 'stroke max of leg 3')
-        """
-        from polypod.simulation import simulate
-
-        return simulate(
-            self,
-            pose,
-            twist,
-            forces=forces,
-            wrench=wrench,
-            wrench_axes=wrench_axes,
-            until=until,
-            step=step,
-            tolerance=tolerance,
-            stop=stop,
-            sigma_min=sigma_min,
-            progress=progress,
-        )
 
     # --- derivatives and inertial parameters -------------------------------------------------------------
 
@@ -1264,6 +1099,8 @@ def _by_name(names: Sequence[str], rows: Array) -> dict[str, Array]:
 
 def _found(faults: Sequence[Fault], text: str | None) -> list[Fault]:
     """The faults with their lines in the text."""
+    from polypod.files.toml_lines import line_of
+
     return [fault if text is None else replace(fault, line=line_of(text, fault.place)) for fault in faults]
 
 
@@ -1297,6 +1134,19 @@ def _from_parts(data: dict[str, Any], text: str | None) -> Mechanism:
     return Mechanism(data, text=text)
 
 
+def _stroke(least: float, greatest: float) -> str:
+    low, high = (readable(end, "m") for end in (least, greatest))
+    if np.isfinite(least) and least != 0.0:
+        return f"{low} to {high}" if np.isfinite(greatest) else f"from {low}"
+    return f"to {high}" if np.isfinite(greatest) else "free"
+
+
+def spans(mech: Mechanism) -> Array:
+    """(n,): from base joint to platform joint at the centre pose, m: the lengths of legs and struts."""
+    home = mech.inverse_kinematics(mech.home)
+    return np.where(mech.sliders, np.linalg.norm(home.vectors, axis=-1), home.lengths)
+
+
 def list_mechanisms() -> tuple[str, ...]:
     """Names of the built-in mechanisms."""
     return tuple(
@@ -1320,12 +1170,13 @@ def load(source: str | Path) -> Mechanism:
         return Mechanism.from_toml((_built_in() / f"{name}.toml").read_text(encoding="utf-8"), origin=name)
     if not path.is_file():
         raise UnknownNameError("mechanism file or built-in mechanism", name, list_mechanisms())
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise MechanismError([Fault("toml", f"is not UTF-8 text: {error}")], name) from None
+    text = read_text(path)
+    if isinstance(text, Fault):
+        raise MechanismError([text], name)
     return Mechanism.from_toml(text, origin=name)
 
 
 def _built_in() -> Any:
+    from importlib.resources import files
+
     return files("polypod") / "mechanisms"

@@ -55,7 +55,7 @@ def _readable(error: Exception) -> str:
 
 def _print_version(wanted: bool) -> None:
     if wanted:
-        from polypod import __version__
+        from polypod._core import __version__
 
         print(f"polypod {__version__}")
         raise typer.Exit

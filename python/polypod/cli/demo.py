@@ -22,7 +22,7 @@ def demo(
     """Solve the published manipulator along the built-in motion: tables, figures and a summary in DIR."""
     from rich.markdown import Markdown
 
-    from polypod.demo import run_demo
+    from polypod.report.demo import run_demo
 
     with working("solving and drawing"):
         result = run_demo(directory)

@@ -22,7 +22,7 @@ from polypod.cli.shared import (
 from polypod.errors import ExportError
 
 if TYPE_CHECKING:
-    from polypod.export.files import Look
+    from polypod.export.formats import Look
 
 app = typer.Typer()
 
@@ -83,11 +83,11 @@ def export(
 
     What a format leaves out is printed, and stands in the file if it can hold comments.
     """
-    from polypod.export.files import FORMATS, format_of
-    from polypod.export.files import export as write
+    from polypod.cli.quantities import named
+    from polypod.export.formats import FORMATS, format_of
+    from polypod.export.formats import export as write
     from polypod.mechanism import load
-    from polypod.motion import load_motion
-    from polypod.quantities import named
+    from polypod.motion.motion_file import load_motion
 
     name = format_of(output, None if to is None else to.value)
     suffixes = FORMATS[name].suffixes if to is None else (output.suffix,)

@@ -56,8 +56,8 @@ def fk(
 
     The exit status is 1 if a row has no pose, or if one of its poses may be missing.
     """
-    from polypod.lengths import load_lengths, save_table, tabulate_continued, tabulate_modes
     from polypod.mechanism import load
+    from polypod.solution.poses_of_lengths import load_lengths, save_table, tabulate_continued, tabulate_modes
 
     if result is not None:
         check_result_path(result, mechanism, str(lengths), suffixes=(".csv",))
@@ -80,7 +80,7 @@ def fk(
 
 def _print_poses(out: Console, facts: dict[str, Any]) -> None:
     """One table; narrow, so that position and status stay whole where there is room for 80 characters."""
-    from polypod.units import KIND_OF_COORDINATE, from_si
+    from polypod.files.units import KIND_OF_COORDINATE, from_si
 
     rows = [(row, mode) for row in facts["rows"] for mode in row["modes"]]
     if rows:

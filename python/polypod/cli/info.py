@@ -35,7 +35,7 @@ def info(
 ) -> None:
     """Tell what a mechanism is: freedoms, joints, constraints, coordinates, conditioning, warnings."""
     from polypod.mechanism import load
-    from polypod.summary import describe
+    from polypod.summary.mechanism_facts import describe
 
     mech = load(mechanism)
     facts = describe(mech)
@@ -58,7 +58,7 @@ def _draw(mech: Mechanism, path: Path) -> None:
 
 
 def _print_mechanism(out: Console, facts: dict[str, Any]) -> None:
-    from polypod.tables import mechanism_tables
+    from polypod.summary.tables import mechanism_tables
 
     out.print(f"[bold]{escape(facts['name'])}[/bold]  {escape(facts['description'])}")
     if facts["source"]:

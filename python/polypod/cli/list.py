@@ -13,7 +13,7 @@ app = typer.Typer()
 @app.command("list", epilog="Example: [bold]polypod list[/bold]")
 def list_(as_json: JsonOption = False) -> None:
     """List the built-in mechanisms, a line each; `polypod info NAME` tells more."""
-    from polypod.summary import catalogue
+    from polypod.summary.mechanism_facts import catalogue
 
     facts = catalogue()
     if as_json:

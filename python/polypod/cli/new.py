@@ -21,7 +21,7 @@ def new(
     ] = None,
 ) -> None:
     """Write a mechanism file to start from: a small machine with every entry explained."""
-    from polypod.starting import starting_text
+    from polypod.cli.templates import starting_text
 
     text = starting_text(path, like)
     with path.open("x", encoding="utf-8") as file:

@@ -49,8 +49,8 @@ def report(
 
     The page needs no network and no other file. The exit status is 1 if some states have no answer.
     """
+    from polypod.cli.quantities import quantity
     from polypod.mechanism import load
-    from polypod.quantities import quantity
     from polypod.report.content import gather
     from polypod.report.page import render, save
 

@@ -17,10 +17,10 @@ from rich.text import Text
 if TYPE_CHECKING:
     from polypod.mechanism import Mechanism
 
-from polypod.tables import Table as Words
-from polypod.tables import fixed as fixed
-from polypod.tables import range_mm as range_mm
-from polypod.tables import significant as significant
+from polypod.summary.tables import Table as Words
+from polypod.summary.tables import fixed as fixed
+from polypod.summary.tables import range_mm as range_mm
+from polypod.summary.tables import significant as significant
 
 MechanismArgument = Annotated[
     str, typer.Argument(metavar="MECHANISM", help="A mechanism file (.toml) or a built-in mechanism's name.")
@@ -59,8 +59,8 @@ def check_result_path(path: Path, *inputs: str, suffixes: tuple[str, ...] = RESU
 
 def pose_at(mech: Mechanism, coordinates: dict[str, float], branch: int) -> Any:
     """The pose with the coordinates of `--at`; wrong input where there is none."""
+    from polypod.answers.status import Status
     from polypod.errors import PolypodError
-    from polypod.status import Status
 
     state = mech.state(coordinates, branch=branch)
     status = Status(int(state.status))

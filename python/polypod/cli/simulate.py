@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 from rich.markup import escape
@@ -19,9 +19,6 @@ from polypod.cli.shared import (
     progress_bar,
 )
 from polypod.cli.solve import print_solution
-
-if TYPE_CHECKING:
-    pass
 
 app = typer.Typer()
 
@@ -64,12 +61,13 @@ def simulate(
 
     It ends at the first limit or singularity. The exit status is 1 if it ends without an answer.
     """
-    from polypod.control import ComputedTorque
+    from polypod.cli.quantities import named
     from polypod.mechanism import load
-    from polypod.motion import load_motion
-    from polypod.quantities import named
-    from polypod.simulation import STOPS
-    from polypod.summary import summarise
+    from polypod.motion.motion_file import load_motion
+    from polypod.solution.computed_torque import ComputedTorque
+    from polypod.solution.simulate import STOPS
+    from polypod.solution.simulate import simulate as run
+    from polypod.summary.solution_facts import summarise
 
     check_result_path(result, mechanism)
     mech = load(mechanism)
@@ -81,7 +79,8 @@ def simulate(
         branch = motion.branch
     pose = mech.home if not coordinates else pose_at(mech, coordinates, branch)
     with progress_bar("simulating", 1) as progress:
-        solution = mech.simulate(
+        solution = run(
+            mech,
             pose,
             forces=law,
             until=until,

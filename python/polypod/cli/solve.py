@@ -23,8 +23,8 @@ from polypod.cli.shared import (
 
 if TYPE_CHECKING:
     from polypod.mechanism import Mechanism
-    from polypod.motion import Motion
-    from polypod.results import Solution
+    from polypod.motion.motion import Motion
+    from polypod.solution.solution import Solution
 
 app = typer.Typer()
 
@@ -54,8 +54,8 @@ def solve(
     import numpy as np
 
     from polypod.mechanism import load
-    from polypod.motion import load_motion
-    from polypod.summary import summarise
+    from polypod.motion.motion_file import load_motion
+    from polypod.summary.solution_facts import summarise
 
     check_result_path(result, mechanism, motion)
     mech = load(mechanism)
@@ -76,8 +76,8 @@ def solve(
 
 def _solve_with_progress(mech: Mechanism, motion: Motion, *, reactions: bool = False) -> Solution:
     """Solves, with a bar on the terminal when there is more than a moment's work."""
-    from polypod.solution import CHUNK
-    from polypod.solution import solve as solve_motion
+    from polypod.solution.solve import CHUNK
+    from polypod.solution.solve import solve as solve_motion
 
     if len(motion.time) <= CHUNK:
         return solve_motion(mech, motion, reactions=reactions)
@@ -87,7 +87,7 @@ def _solve_with_progress(mech: Mechanism, motion: Motion, *, reactions: bool = F
 
 def print_solution(out: Console, facts: dict[str, Any]) -> None:
     """The summary of a solution: legs, platform, power, limits, outcomes."""
-    from polypod.tables import coupled_note, motion_tables, outcome, outcomes_table
+    from polypod.summary.tables import coupled_note, motion_tables, outcome, outcomes_table
 
     out.print(
         f"[bold]{escape(facts['mechanism'])}[/bold] along [bold]{escape(facts['motion'])}[/bold] "

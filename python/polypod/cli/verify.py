@@ -58,7 +58,7 @@ def verify(
     import numpy as np
 
     from polypod.mechanism import load
-    from polypod.motion import load_motion
+    from polypod.motion.motion_file import load_motion
     from polypod.verify import TOLERANCE, integrate
     from polypod.verify import verify as verify_motion
 
@@ -90,7 +90,7 @@ def verify(
 
 
 def _print_verification(out: Console, facts: dict[str, Any]) -> None:
-    from polypod.verify.report import verdict
+    from polypod.verify.verdict import verdict
 
     out.print(
         f"[bold]{escape(facts['mechanism'])}[/bold] along [bold]{escape(facts['motion'])}[/bold]",
@@ -123,7 +123,7 @@ def _print_verification(out: Console, facts: dict[str, Any]) -> None:
 
 
 def _print_integration(out: Console, facts: dict[str, Any]) -> None:
-    from polypod.verify.report import integration_verdict
+    from polypod.verify.verdict import integration_verdict
 
     headers = ("position / m>", "rotation / rad>", "legs / m>", "order>")
     table = new_table("The motion under the forces, by step", "step / s>", *headers)

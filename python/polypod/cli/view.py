@@ -39,7 +39,7 @@ def view(
     The page is there until Ctrl-C. It needs the optional package viser.
     """
     from polypod.mechanism import load
-    from polypod.motion import load_motion
+    from polypod.motion.motion_file import load_motion
     from polypod.viewer.server import LOCAL, Viewer, require_viser
     from polypod.viewer.static import check_static_path, write_static
 

@@ -91,8 +91,10 @@ def workspace(
 
     Values without a unit are in m and rad.
     """
+    from polypod.cli.quantities import interval, named, names_of, steps_of
     from polypod.mechanism import load
-    from polypod.quantities import interval, named, names_of, steps_of
+    from polypod.workspaces.length_lattice import length_lattice
+    from polypod.workspaces.search import workspace as find
 
     names = None if vary is None else names_of(vary)
     kind = kind or (Kind.SLICE if names else Kind.REACHABLE)
@@ -105,7 +107,8 @@ def workspace(
                 f"--step: the step of lengths is one number, not one for {next(iter(widths))}"
             )
         with progress_bar("length lattice", 1) as progress:
-            lattice = mech.length_lattice(
+            lattice = length_lattice(
+                mech,
                 step=widths,
                 bounds=dict(interval("--bounds", text) for text in bounds or []),
                 sigma_min=sigma_min,
@@ -115,7 +118,8 @@ def workspace(
         print_json(lattice.facts()) if as_json else _print_lattice(console(), lattice.facts())
         return
     with progress_bar(f"{kind} workspace", 1) as progress:
-        found = mech.workspace(
+        found = find(
+            mech,
             names,
             dict(named("--fix", text) for text in fix or []),
             step=widths,
@@ -154,7 +158,7 @@ def _check_workspace_options(
     keep_aspect: bool,
 ) -> None:
     """Before any work: options that do not go together, and files that could not be written after it."""
-    from polypod.workspace import check_suffix
+    from polypod.workspaces.workspace import check_suffix
 
     if kind is Kind.SLICE and not names:
         raise WorkspaceError("--kind slice needs --vary, such as --vary x,y,z")
@@ -179,8 +183,8 @@ def _check_workspace_options(
 
 
 def _print_workspace(out: Console, facts: dict[str, Any]) -> None:
-    from polypod.tables import ends_table, extents_table
-    from polypod.units import coordinate_unit, readable
+    from polypod.files.units import coordinate_unit, readable
+    from polypod.summary.tables import ends_table, extents_table
 
     fixed = ", ".join(
         f"{name} = {readable(value, coordinate_unit(name))}" for name, value in facts.get("fixed", {}).items()
@@ -198,7 +202,7 @@ def _print_workspace(out: Console, facts: dict[str, Any]) -> None:
 
 
 def _print_lattice(out: Console, facts: dict[str, Any]) -> None:
-    from polypod.units import readable
+    from polypod.files.units import readable
 
     out.print(
         f"[bold]{escape(facts['mechanism'])}[/bold]: lattice of leg lengths, steps of "

@@ -16,15 +16,15 @@ import trimesh
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from polypod.bodies import Link, Piece, link_frames, links_of
+from polypod.bodies.links import Link, Piece, link_frames, links_of
+from polypod.bodies.palette import rgb
 from polypod.errors import ExportError
+from polypod.files.glb import Y_UP, glb_of, linear_rgb, unused_name
 from polypod.mechanism import Mechanism
-from polypod.multibody.placement import inverse
+from polypod.vectors import inverse
 
 Array = NDArray[np.float64]
 
-Y_UP = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, -1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
-"""From Polypod's axes to glTF's: (x, y, z) becomes (x, z, -y)."""
 STILL = 1e-9
 """What changes by no more over a motion, m or a pure number, has no channel."""
 SHARP = np.radians(40.0)
@@ -68,14 +68,14 @@ def glb(mech: Mechanism, poses: Array, time: Array | None = None) -> tuple[bytes
     if free:
         notes.append(f"how these turn about their own line is not known and drawn anyhow: {', '.join(free)}.")
     parents = _parents(mech, links)
-    base = _unused("scene", {link.name for link in links} | {mech.name})
+    base = unused_name("scene", {link.name for link in links} | {mech.name})
     scene: Any = trimesh.Scene(base_frame=base)
     taken = {base}
-    root = _unused(mech.name, taken)
+    root = unused_name(mech.name, taken)
     scene.graph.update(root, matrix=Y_UP)
     nodes, tracks = [], []
     for i, link in enumerate(links):
-        nodes.append(_unused(link.name, taken))
+        nodes.append(unused_name(link.name, taken))
         parent, now = root, frames[:, i]
         if (k := parents[i]) is not None:
             on = zip(frames[:, k], now, strict=True)
@@ -83,30 +83,15 @@ def glb(mech: Mechanism, poses: Array, time: Array | None = None) -> tuple[bytes
         scene.graph.update(nodes[i], parent, matrix=now[0])
         tracks.append(_track(nodes[i], now))
         for piece in link.pieces:
-            name = _unused(f"{link.name}/{piece.name}", taken)
+            name = unused_name(f"{link.name}/{piece.name}", taken)
             scene.add_geometry(_shaded(piece), name, name, nodes[i])
     if time is None:
-        return _bytes(scene), notes
+        return glb_of(scene), notes
     notes.append(
         f"the animation has {len(frames)} frames, with places and turns interpolated between them; forces "
         "and all other results are not in it."
     )
-    return _bytes(scene, buffer_postprocessor=partial(_animate, tracks, time[placed])), notes
-
-
-def mesh_glb(mesh: trimesh.Trimesh, colors: NDArray[np.uint8], name: str) -> bytes:
-    """A GLB file of one mesh in base axes, m, with colours (v, 3) of its vertices."""
-    mesh = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False, vertex_colors=_linear(colors))
-    scene: Any = trimesh.Scene(base_frame=_unused("scene", {name}))
-    scene.graph.update(name, matrix=Y_UP)
-    scene.add_geometry(mesh, f"{name}/mesh", f"{name}/mesh", name)
-    return _bytes(scene)
-
-
-def _bytes(scene: Any, **options: Any) -> bytes:
-    gltf: Any = trimesh.exchange.gltf
-    data: bytes = gltf.export_glb(scene, include_normals=True, **options)
-    return data
+    return glb_of(scene, buffer_postprocessor=partial(_animate, tracks, time[placed])), notes
 
 
 def _parents(mech: Mechanism, links: tuple[Link, ...]) -> list[int | None]:
@@ -127,27 +112,11 @@ def _parents(mech: Mechanism, links: tuple[Link, ...]) -> list[int | None]:
     return found
 
 
-def _unused(name: str, taken: set[str]) -> str:
-    """The name, or with a number if it is taken; it is then."""
-    found, number = name, 2
-    while found in taken:
-        found, number = f"{name} {number}", number + 1
-    taken.add(found)
-    return found
-
-
-def _linear(srgb: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """Colours as glTF counts them, by light, from the steps of a display; both from 0 to 255."""
-    part = srgb / 255.0
-    light = np.where(part <= 0.04045, part / 12.92, ((part + 0.055) / 1.055) ** 2.4)
-    return np.asarray(np.round(255.0 * light), np.uint8)
-
-
 def _shaded(piece: Piece) -> trimesh.Trimesh:
     """A piece in its colour, with round faces that look round."""
     mesh: trimesh.Trimesh = trimesh.graph.smooth_shade(piece.mesh, angle=SHARP, facet_minarea=None)
-    srgb = np.array([int(piece.color[i : i + 2], 16) for i in (1, 3, 5)], np.uint8)
-    color = [*_linear(srgb).tolist(), 255]
+    srgb = np.array(rgb(piece.color), np.uint8)
+    color = [*linear_rgb(srgb).tolist(), 255]
     visual: Any = trimesh.visual
     material = visual.material.PBRMaterial(
         name=piece.color, baseColorFactor=color, metallicFactor=0.1, roughnessFactor=0.6

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.io import savemat
 
 from polypod.export.names import Names
-from polypod.results import Solution
+from polypod.solution.solution import Solution
 
 LONGEST_NAME = 31
 """Of a field in a file of version 5."""

@@ -9,9 +9,10 @@ from xml.etree import ElementTree
 import numpy as np
 from numpy.typing import NDArray
 
-from polypod.export.lost import FORCES, STROKES, TURNS, lost
+from polypod.answers.status import Status
 from polypod.export.model import Model
 from polypod.export.names import add_comment, xml
+from polypod.export.omissions import FORCES, STROKES, TURNS, lost
 from polypod.export.shapes import Shape
 from polypod.mechanism import Mechanism
 from polypod.multibody.mjcf import (
@@ -24,7 +25,6 @@ from polypod.multibody.mjcf import (
     quaternion,
     skeleton,
 )
-from polypod.status import Status
 
 Array = NDArray[np.float64]
 

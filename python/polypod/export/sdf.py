@@ -8,11 +8,11 @@ from xml.etree import ElementTree
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from polypod.export.lost import FORCES, PLATFORM_TURNS, STROKES, TURNS, lost
 from polypod.export.model import Model, Range
 from polypod.export.names import add_comment, xml
+from polypod.export.omissions import FORCES, PLATFORM_TURNS, STROKES, TURNS, lost
 from polypod.export.shapes import Shape
-from polypod.export.xmlparts import INERTIA, child, effort, lopsided, roll_pitch_yaw
+from polypod.export.xml_common import INERTIA, child, effort, lopsided, roll_pitch_yaw
 from polypod.multibody.mjcf import numbers
 from polypod.multibody.placement import BASE
 from polypod.multibody.tree import POINT, Body, Freedom

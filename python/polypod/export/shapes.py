@@ -9,11 +9,12 @@ import numpy as np
 import trimesh
 from numpy.typing import NDArray
 
-from polypod.bodies import Link, leg_radii, links_of
+from polypod.bodies.links import Link, leg_radii, links_of
+from polypod.bodies.palette import PALE, color_of
+from polypod.bodies.rails import way
 from polypod.mechanism import Mechanism
-from polypod.multibody.placement import across, leg_bodies, rod_body
-from polypod.rails import unit, way
-from polypod.style import PALE, color_of
+from polypod.multibody.placement import leg_bodies, rod_body
+from polypod.vectors import perpendiculars, unit
 
 Array = NDArray[np.float64]
 
@@ -82,7 +83,7 @@ def simple(mech: Mechanism) -> dict[str, list[Shape]]:
     shapes: dict[str, list[Shape]] = {"base": [], "platform": []}
     for k, rod in enumerate(spec["rods"]):
         points = [np.array(leg["base"]["point"]) for leg in spec["legs"] if leg["base"]["rod"] == k]
-        line = np.array(rod["axis"]) / np.linalg.norm(rod["axis"])
+        line = unit(rod["axis"])
         along = [float((point - rod["point"]) @ line) for point in points]
         radius = max(radii)
         ends = np.array([[min(along) - radius, 0.0, 0.0], [max(along) + radius, 0.0, 0.0]])
@@ -136,6 +137,6 @@ def _bar(name: str, ends: Array, radius: float, color: str) -> Shape:
     length = float(np.linalg.norm(ends[1] - ends[0]))
     axis = (ends[1] - ends[0]) / length
     frame = np.eye(4)
-    frame[:3, :3] = np.column_stack([*across(axis), axis])
+    frame[:3, :3] = np.column_stack([*perpendiculars(axis), axis])
     frame[:3, 3] = ends.mean(axis=0)
     return Shape(name, "cylinder", frame, (radius, length), color)

@@ -8,10 +8,10 @@ import numpy as np
 import trimesh
 from numpy.typing import NDArray
 
-from polypod.bodies import link_frames, links_of
+from polypod.answers.status import Status
+from polypod.bodies.links import link_frames, links_of
 from polypod.errors import ExportError
 from polypod.mechanism import Mechanism
-from polypod.status import Status
 
 Array = NDArray[np.float64]
 

@@ -16,14 +16,15 @@ from xml.etree import ElementTree
 import numpy as np
 from numpy.typing import NDArray
 
-from polypod.export.lost import FORCES, PLATFORM_TURNS, STROKES, TURNS, lost
 from polypod.export.model import Model, Range
 from polypod.export.names import add_comment, xml
+from polypod.export.omissions import FORCES, PLATFORM_TURNS, STROKES, TURNS, lost
 from polypod.export.shapes import Shape
-from polypod.export.xmlparts import INERTIA, NO_LIMIT, bounds, child, effort, lopsided, roll_pitch_yaw
+from polypod.export.xml_common import INERTIA, NO_LIMIT, bounds, child, effort, lopsided, roll_pitch_yaw
 from polypod.multibody.mjcf import joint_name, numbers
-from polypod.multibody.placement import BASE, PLATFORM, inverse
+from polypod.multibody.placement import BASE, PLATFORM
 from polypod.multibody.tree import POINT, Body, Freedom
+from polypod.vectors import inverse
 
 Array = NDArray[np.float64]
 

@@ -8,8 +8,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from polypod.multibody.placement import cross, unit
 from polypod.multibody.tree import POINT, Closure, Freedom, Multibody, Y
+from polypod.vectors import cross, frame_at, unit
 
 Array = NDArray[np.float64]
 
@@ -69,7 +69,9 @@ def closing_joint(tree: Multibody, closure: Closure) -> ClosingJoint:
         case _:
             raise ValueError(f"{closure.name}: no joint keeps {len(closure.squares)} turns")
     a, b = closure.points
-    return ClosingJoint(closure.name, kind, closure.bodies, (_frame(np.eye(3), a), _frame(turn, b)), freedoms)
+    return ClosingJoint(
+        closure.name, kind, closure.bodies, (frame_at(np.eye(3), a), frame_at(turn, b)), freedoms
+    )
 
 
 def _turn(axis: Array, to: Array, near: Array, near_to: Array) -> Array:
@@ -80,9 +82,3 @@ def _turn(axis: Array, to: Array, near: Array, near_to: Array) -> Array:
 def _axes(first: Array, second: Array) -> Array:
     second = unit(second - first * (first @ second))
     return np.column_stack([first, second, cross(first, second)])
-
-
-def _frame(turn: Array, origin: Array) -> Array:
-    frame = np.eye(4)
-    frame[:3, :3], frame[:3, 3] = turn, origin
-    return frame

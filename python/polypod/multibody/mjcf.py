@@ -14,8 +14,9 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
 from polypod.multibody.closing import ClosingJoint, closing_joints
-from polypod.multibody.placement import BASE, Placements, inverse, turn_about
+from polypod.multibody.placement import BASE, Placements
 from polypod.multibody.tree import POINT, Body, Freedom, Multibody, joint_values
+from polypod.vectors import inverse, turn_about
 
 Array = NDArray[np.float64]
 Inertial = tuple[float, Array]

@@ -11,9 +11,10 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from polypod.schema import SLIDER_LINKS, TELESCOPE_LINKS
+from polypod.files.mechanism_schema import SLIDER_LINKS, TELESCOPE_LINKS
+from polypod.vectors import cross, frame_at, perpendiculars, unit
 
 Array = NDArray[np.float64]
 Placements = dict[str, Array]
@@ -86,14 +87,14 @@ def placements(geometry: Mapping[str, Any], pose: Array, *, zero: bool = False) 
         axes = np.column_stack([n, delta, cross(n, delta)])
         lower, upper = leg_bodies(leg)
         if leg["slider"] is None:
-            found[lower] = _frame(axes, start)
-            found[upper] = _frame(axes, start + delta * np.linalg.norm(end - start))
+            found[lower] = frame_at(axes, start)
+            found[upper] = frame_at(axes, start + delta * np.linalg.norm(end - start))
         else:
-            found[lower] = _frame(np.eye(3), start)
-            found[upper] = _frame(axes, start)
+            found[lower] = frame_at(np.eye(3), start)
+            found[upper] = frame_at(axes, start)
     for k, rod in enumerate(geometry["rods"]):
         line, n = unit(rod["axis"]), normals[k]
-        found[rod_body(rod)] = _frame(np.column_stack([line, n, cross(line, n)]), rod["point"])
+        found[rod_body(rod)] = frame_at(np.column_stack([line, n, cross(line, n)]), rod["point"])
     return found
 
 
@@ -115,48 +116,6 @@ def _base_joint(leg: Mapping[str, Any], end: Array) -> Array:
 
 def _normal(turning: Turning | None, pose: Array, delta: Array) -> Array:
     if turning is None:
-        return across(delta)[0]
+        return perpendiculars(delta)[0]
     axis = turning.axis if turning.side == "base" else pose[:3, :3] @ turning.axis
     return axis if turning.along else unit(cross(axis, delta))
-
-
-def _frame(axes: Array, origin: ArrayLike) -> Array:
-    frame = np.eye(4)
-    frame[:3, :3], frame[:3, 3] = axes, origin
-    return frame
-
-
-def inverse(frame: Array) -> Array:
-    """Of a homogeneous matrix (4, 4)."""
-    return _frame(frame[:3, :3].T, -frame[:3, :3].T @ frame[:3, 3])
-
-
-def unit(vector: ArrayLike) -> Array:
-    """The direction of a vector (3,); NaN for one of no length."""
-    array = np.asarray(vector, dtype=np.float64)
-    with np.errstate(invalid="ignore"):
-        return np.asarray(array / np.linalg.norm(array))
-
-
-def cross(a: Array, b: Array) -> Array:
-    """The vector a×b of two vectors (3,): numpy's own takes ten times as long for so few numbers."""
-    (x, y, z), (u, v, w) = a, b
-    return np.array([y * w - z * v, z * u - x * w, x * v - y * u])
-
-
-def across(axis: Array) -> tuple[Array, Array]:
-    """Two unit vectors square to a unit vector and to each other."""
-    first = unit(cross(axis, np.eye(3)[np.argmin(np.abs(axis))]))
-    return first, cross(axis, first)
-
-
-def turn_about(axis: Array, start: Array, end: Array) -> float:
-    """The angle, rad, by which a turn about a unit axis takes one direction to another."""
-    across_start = start - axis * (axis @ start)
-    return float(np.arctan2(cross(axis, start) @ end, across_start @ end))
-
-
-def turned(axis: Array, angle: float) -> Array:
-    """(3, 3): the rotation about a unit axis."""
-    hat = np.cross(np.eye(3), axis)
-    return np.asarray(np.eye(3) + np.sin(angle) * hat + (1.0 - np.cos(angle)) * (hat @ hat))

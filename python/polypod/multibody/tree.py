@@ -19,17 +19,12 @@ from polypod.multibody.placement import (
     BASE,
     PLATFORM,
     Placements,
-    across,
-    cross,
-    inverse,
     leg_bodies,
     placements,
     rod_body,
-    turn_about,
-    turned,
     turning_of,
-    unit,
 )
+from polypod.vectors import cross, inverse, perpendiculars, turn_about, turned, unit
 
 Array = NDArray[np.float64]
 
@@ -212,7 +207,7 @@ def joint_values(body: Body, zero: Array, now: Array) -> list[float | Array]:
             case "revolute":
                 # The turn that brings the next axis, which turns with this one alone, to where it is.
                 rest = body.freedoms[i + 1 :]
-                seen = rest[0].axis if rest else across(freedom.axis)[0]
+                seen = rest[0].axis if rest else perpendiculars(freedom.axis)[0]
                 angle = turn_about(freedom.axis, seen, rotation @ seen)
                 values.append(angle)
                 rotation = turned(freedom.axis, -angle) @ rotation
@@ -319,7 +314,7 @@ def _platform_squares(joint: Mapping[str, Any]) -> tuple[tuple[Array, Array], ..
         case "U":
             return ((X, unit(joint["axis"])),)
         case "R":
-            first, second = across(unit(joint["axis"]))
+            first, second = perpendiculars(unit(joint["axis"]))
             return ((X, first), (X, second))
     normal = unit(joint["normal"])
     along = np.array(joint["axis"]) - normal * (normal @ joint["axis"])

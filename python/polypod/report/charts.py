@@ -10,9 +10,9 @@ import numpy as np
 from markupsafe import Markup
 from numpy.typing import NDArray
 
+from polypod.plots.series import Panel
 from polypod.report.decimate import kept
 from polypod.report.formulas import to_html
-from polypod.series import Panel
 
 Array = NDArray[np.float64]
 

@@ -8,19 +8,21 @@ from typing import Any
 
 import numpy as np
 
-from polypod.actuators import requirements
 from polypod.errors import PolypodError
 from polypod.mechanism import Mechanism, load
-from polypod.motion import Motion
-from polypod.paper import MECHANISM
-from polypod.paper_tables import TABLE_II, table_i_markdown, table_iii_markdown
-from polypod.regions import own_coordinates
+from polypod.motion.motion import Motion
+from polypod.paper.table_i import MECHANISM
+from polypod.paper.tables import TABLE_II, table_i_markdown, table_iii_markdown
 from polypod.report.inputs import MotionSource, Source, mechanism_source, read_motion
 from polypod.report.reactions import Reactions, reactions_along
-from polypod.results import Solution
-from polypod.solution import solve
-from polypod.summary import describe, summarise
-from polypod.workspace import Workspace
+from polypod.solution.actuator_sizing import requirements
+from polypod.solution.solution import Solution
+from polypod.solution.solve import solve
+from polypod.summary.mechanism_facts import describe
+from polypod.summary.solution_facts import summarise
+from polypod.workspaces.search import workspace as find_workspace
+from polypod.workspaces.search_region import own_coordinates
+from polypod.workspaces.workspace import Workspace
 
 Progress = Callable[[float, float], None]
 
@@ -104,13 +106,13 @@ def workspace_of(
     if not wanted:
         return None, "It was left out."
     try:
-        return mech.workspace(step=step), ""
+        return find_workspace(mech, step=step), ""
     except PolypodError as error:
         if step is not None:
             raise
         why = f"None was found: {error}."
     try:
-        return (mech.workspace(own_coordinates(mech)), "") if mech.dof in (2, 3) else (None, why)
+        return (find_workspace(mech, own_coordinates(mech)), "") if mech.dof in (2, 3) else (None, why)
     except PolypodError:
         return None, why
 

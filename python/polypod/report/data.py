@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from polypod.mechanism import Mechanism
-from polypod.tables import Table
+from polypod.summary.tables import Table
 
 
 def data_tables(mech: Mechanism) -> list[Table]:

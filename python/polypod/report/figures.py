@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from polypod.mechanism import Mechanism
 from polypod.plots import plot_mechanism, plot_poses, plot_topology, plot_workspace
-from polypod.results import Solution
-from polypod.style import house_style
-from polypod.workspace import Workspace
+from polypod.plots.style import house_style
+from polypod.solution.solution import Solution
+from polypod.workspaces.workspace import Workspace
 
 Array = NDArray[np.float64]
 

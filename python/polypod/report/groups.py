@@ -6,17 +6,17 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from polypod.actuators import leg_power
+from polypod.answers.singularity import NEAR_SINGULAR
+from polypod.answers.status import Status
+from polypod.files.units import coordinate_unit
 from polypod.mechanism import Mechanism
 from polypod.plots import fig4_panels
+from polypod.plots.scene import math_name
+from polypod.plots.series import Panel, in_kilo
 from polypod.report.charts import Chart
 from polypod.report.reactions import Reactions, families
-from polypod.results import Solution
-from polypod.scene import math_name
-from polypod.series import Panel, in_kilo
-from polypod.singularity import NEAR_SINGULAR
-from polypod.status import Status
-from polypod.units import coordinate_unit
+from polypod.solution.actuator_sizing import leg_power
+from polypod.solution.solution import Solution
 
 Array = NDArray[np.float64]
 

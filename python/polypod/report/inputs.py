@@ -12,10 +12,11 @@ from pathlib import Path
 import numpy as np
 
 from polypod import _core
+from polypod.files.units import coordinate_unit, si_unit
 from polypod.mechanism import Mechanism
-from polypod.motion import KIND_OF_WRENCH, Motion, load_motion, motion_text
-from polypod.results import Solution
-from polypod.units import coordinate_unit, si_unit
+from polypod.motion.motion import Motion
+from polypod.motion.motion_file import KIND_OF_WRENCH, load_motion, motion_text
+from polypod.solution.solution import Solution
 
 CHARACTERS = 200_000
 """A longer text is shown with its first and last lines only."""

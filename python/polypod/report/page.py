@@ -15,8 +15,8 @@ from markdown_it import MarkdownIt
 from markupsafe import Markup
 from plotly.offline import get_plotlyjs
 
-from polypod import tables
-from polypod.drives import links_of_leg
+from polypod.files.mechanism_schema import SLIDER_LINKS, TELESCOPE_LINKS
+from polypod.files.text import replacing
 from polypod.mechanism import Mechanism
 from polypod.report import figures, groups
 from polypod.report.charts import Chart, Series
@@ -27,8 +27,8 @@ from polypod.report.inputs import MotionSource, versions
 from polypod.report.reactions import reactions_table
 from polypod.report.space import workspace_figure
 from polypod.report.words import actuators_table, glance, outcomes, warnings, workspace_words
-from polypod.results import replacing
-from polypod.workspace import Workspace
+from polypod.summary import tables
+from polypod.workspaces.workspace import Workspace
 
 
 def report_html(
@@ -176,8 +176,8 @@ def _motion(mech: Mechanism, along: Along, series: Series) -> dict[str, Any]:
         "undetermined": bool(along.reactions.undetermined.any()),
         "singularity_charts": shown(groups.singularity_charts(mech, solution)),
         "legs": [
-            (name, shown(groups.leg_charts(data, i, links_of_leg(mech.leg_letters[i]))))
-            for i, name in enumerate(mech.leg_names)
+            (name, shown(groups.leg_charts(data, i, SLIDER_LINKS if sliding else TELESCOPE_LINKS)))
+            for i, (name, sliding) in enumerate(zip(mech.leg_names, mech.sliders.tolist(), strict=True))
         ],
         "source": along.source,
     }

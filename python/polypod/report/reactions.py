@@ -7,11 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from polypod.answers import Joint
+from polypod.answers.parts import Joint
 from polypod.mechanism import Mechanism
-from polypod.results import Solution
-from polypod.solution import CHUNK
-from polypod.tables import Table, fixed
+from polypod.solution.solution import Solution
+from polypod.solution.solve import CHUNK
+from polypod.summary.tables import Table, fixed
 
 Array = NDArray[np.float64]
 

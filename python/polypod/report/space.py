@@ -8,12 +8,12 @@ import numpy as np
 import plotly.graph_objects as go
 from numpy.typing import NDArray
 
+from polypod.bodies.palette import GREY, color_of
 from polypod.mechanism import Mechanism
+from polypod.plots.workspace import face_labels
 from polypod.report.decimate import kept
 from polypod.report.formulas import to_html
-from polypod.style import GREY, color_of
-from polypod.workspace import Workspace
-from polypod.workspace_plot import face_labels
+from polypod.workspaces.workspace import Workspace
 
 Array = NDArray[np.float64]
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from polypod.drives import slides, word
+from polypod.answers.leg_words import slides, word
+from polypod.files.units import coordinate_unit, readable
 from polypod.report.content import Along, Content
-from polypod.tables import Table, fixed, outcome, range_mm, significant
-from polypod.units import coordinate_unit, readable
+from polypod.summary.tables import Table, fixed, outcome, range_mm, significant
 
 
 def warnings(content: Content) -> list[str]:

@@ -4,8 +4,8 @@
 forces over time. The engines are installed by `pip install polypod[verify]`.
 """
 
+from polypod.verify.comparison import ENGINES, TOLERANCE, Comparison, Row, Verification, verify, verify_states
 from polypod.verify.integrate import Integration, integrate
-from polypod.verify.table import ENGINES, TOLERANCE, Comparison, Row, Verification, verify, verify_states
 
 __all__ = [
     "ENGINES",

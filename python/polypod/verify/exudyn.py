@@ -16,11 +16,12 @@ from exudyn import itemInterface as items
 from exudyn.rigidBodyUtilities import AngularVelocity2EulerParameters_t, RotationMatrix2EulerParameters
 from numpy.typing import NDArray
 
-from polypod.multibody.placement import BASE, PLATFORM, Placements, across, cross
+from polypod.answers.status import Status
+from polypod.multibody.placement import BASE, PLATFORM, Placements
 from polypod.multibody.tree import POINT, Body, Multibody, Y
-from polypod.status import Status
-from polypod.verify.forced import Forced, inertial
-from polypod.verify.rows import Row, Slide, Start
+from polypod.vectors import cross, perpendiculars
+from polypod.verify.constraints import Row, Slide, Start
+from polypod.verify.twin import Forced, inertial
 
 Array = NDArray[np.float64]
 Drive = Callable[[float], tuple[Array, Array]]
@@ -260,7 +261,7 @@ class System:
 
 def _axis_in_column(axis: Array, column: int) -> Array:
     """(3, 3): a rotation with a unit axis in a column."""
-    return np.roll(np.column_stack([axis, *across(axis)]), column, axis=1)
+    return np.roll(np.column_stack([axis, *perpendiculars(axis)]), column, axis=1)
 
 
 def _settings(duration: float, steps: int) -> Any:

@@ -14,13 +14,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from polypod.answers.status import Status
 from polypod.errors import PolypodError
 from polypod.mechanism import Mechanism
-from polypod.motion import Motion
+from polypod.motion.motion import Motion
 from polypod.multibody.tree import describe
-from polypod.solution import states_along
-from polypod.status import Status
-from polypod.verify.table import engine_class, load_at_o
+from polypod.solution.solve import states_along
+from polypod.verify.comparison import engine_class, load_at_o
 
 Array = NDArray[np.float64]
 

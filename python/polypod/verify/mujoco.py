@@ -16,12 +16,12 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from polypod.answers.status import Status
 from polypod.multibody.mjcf import Settings, configuration, skeleton
 from polypod.multibody.placement import PLATFORM
 from polypod.multibody.tree import Multibody
-from polypod.status import Status
-from polypod.verify.forced import Forced, inertial, light, pull
-from polypod.verify.rows import Start
+from polypod.verify.constraints import Start
+from polypod.verify.twin import Forced, inertial, light, pull
 
 Array = NDArray[np.float64]
 

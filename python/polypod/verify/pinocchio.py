@@ -13,9 +13,10 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from polypod.multibody.placement import BASE, PLATFORM, Placements, cross, inverse
+from polypod.answers.status import Status
+from polypod.multibody.placement import BASE, PLATFORM, Placements
 from polypod.multibody.tree import Body, Freedom, Multibody, joint_values, release
-from polypod.status import Status
+from polypod.vectors import cross, inverse
 
 Array = NDArray[np.float64]
 

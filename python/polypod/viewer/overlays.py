@@ -14,15 +14,17 @@ import numpy as np
 import trimesh
 from numpy.typing import NDArray
 
-from polypod import drives
-from polypod.answers import AssemblyModes
-from polypod.bodies import LinkPlaces
+from polypod.answers import leg_words
+from polypod.answers.kinematics import AssemblyModes
+from polypod.answers.status import Status
+from polypod.bodies.links import LinkPlaces
 from polypod.errors import PolypodError
-from polypod.status import Status
+from polypod.mechanism import spans
+from polypod.viewer.model import LATERAL, Model
 from polypod.viewer.panel import Inbox, listen
 from polypod.viewer.scene import Arrows, add_labels, add_triads, add_workspace
-from polypod.viewer.state import LATERAL, Model
-from polypod.workspace import Workspace
+from polypod.workspaces.search import workspace
+from polypod.workspaces.workspace import Workspace
 
 if TYPE_CHECKING:
     import viser
@@ -42,7 +44,7 @@ class Overlays:
     def __init__(self, server: viser.ViserServer, model: Model, arrows: Arrows, inbox: Inbox) -> None:
         self._server, self._model, self._arrows, self._inbox = server, model, arrows, inbox
         self._places = LinkPlaces(model.mech)
-        self._of = drives.words(model.mech.leg_letters)
+        self._of = leg_words.words(model.mech.leg_letters)
         self._busy = threading.Lock()
         self._workspace: Any = None
         self._modes: list[Any] = []
@@ -75,7 +77,7 @@ class Overlays:
 
     def _add_workspace(self) -> None:
         gui, mech = self._server.gui, self._model.mech
-        reach = 2e3 * LATERAL * float(drives.spans(mech).mean())
+        reach = 2e3 * LATERAL * float(spans(mech).mean())
         step = round(min(max(reach / 30.0, _STEPS[0]), _STEPS[1]))
         with gui.add_folder("Workspace", expand_by_default=True):
             self._step = gui.add_slider("step / mm", _STEPS[0], _STEPS[1], 1.0, float(step))
@@ -95,7 +97,7 @@ class Overlays:
                 self._say(self._found, f"Looking … {100.0 * done / total:.0f} %")
 
         try:
-            found = self._model.mech.workspace(step=step, threads=1, progress=progress)
+            found = workspace(self._model.mech, step=step, threads=1, progress=progress)
         except PolypodError as error:
             self._say(self._found, str(error))
             return

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from polypod import drives
-from polypod.viewer import words
+from polypod.answers import leg_words
+from polypod.viewer import html
+from polypod.viewer.model import Model, View
 from polypod.viewer.player import SPEEDS, Player
-from polypod.viewer.state import Model, View
 
 if TYPE_CHECKING:
     import viser
@@ -77,7 +77,7 @@ class Panel:
         self.tabs = gui.add_tab_group()
         with self.tabs.add_tab("Coordinates"):
             self._add_coordinates()
-        with self.tabs.add_tab(drives.words(model.mech.leg_letters).capitalize()):
+        with self.tabs.add_tab(leg_words.words(model.mech.leg_letters).capitalize()):
             self._lengths = [self._length_slider(i) for i in range(model.mech.n_legs)]
         if player is not None:
             with self.tabs.add_tab("Motion"):
@@ -113,12 +113,12 @@ class Panel:
 
     def _slider(self, set: str, name: str) -> _Slider:
         model = self._model
-        factor, unit, _ = words.scaled(name)
+        factor, unit, _ = html.scaled(name)
         step = _STEP if unit else 0.01
         low, high = (round(factor * end, 1) for end in model.range(name))
         now = float(model.mech.coordinates(model.pose, set)[name])
         start = min(max(round(factor * now, 1), low), high)
-        handle = self._gui.add_slider(words.label(name), low, high, step, start)
+        handle = self._gui.add_slider(html.label(name), low, high, step, start)
         slider = _Slider(handle, ("coordinate", set, name), factor, step)
 
         def move(value: float) -> None:
@@ -136,7 +136,7 @@ class Panel:
         start = min(max(round(now, 1), low), high)
         active = bool(model.mech.actuated[leg])
         label = f"{model.mech.leg_names[leg]} / mm"
-        what = drives.word([model.mech.leg_letters[leg]])
+        what = leg_words.word([model.mech.leg_letters[leg]])
         hint = None if active else f"A passive leg: its {what} follows from the others."
         handle = self._gui.add_slider(label, low, high, _STEP, start, disabled=not active, hint=hint)
         slider = _Slider(handle, ("length", leg), 1e3, _STEP)
@@ -192,7 +192,7 @@ class Panel:
     def show(self, view: View, largest: float, answered: float | None) -> None:
         """The numbers of a view, and the sliders where it is; `largest` and `answered` as for `numbers`."""
         self._view, self._largest = view, largest
-        self._status.content = words.status(view.notes, view.level)
+        self._status.content = html.status(view.notes, view.level)
         for name, slider in self._sliders[self._model.set].items():
             slider.show(view.coordinates[name], self._inbox)
         for leg, slider in enumerate(self._lengths):
@@ -202,12 +202,12 @@ class Panel:
             label = "Pause" if self._player.playing else "Play"
             if self._play.label != label:
                 self._play.label = label
-        self._numbers.content = words.numbers(view, self._model.mech, {}, largest, answered)
+        self._numbers.content = html.numbers(view, self._model.mech, {}, largest, answered)
 
     def show_ranges(self, ranges: dict[str, tuple[float, float]], answered: float | None) -> None:
         """Adds the nearest singular values to the numbers."""
         if self._view is not None:
-            text = words.numbers(self._view, self._model.mech, ranges, self._largest, answered)
+            text = html.numbers(self._view, self._model.mech, ranges, self._largest, answered)
             self._numbers.content = text
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from polypod.mechanism import Mechanism
-from polypod.motion import Motion
+from polypod.motion.motion import Motion
 
 Array = NDArray[np.float64]
 

@@ -9,19 +9,18 @@ import trimesh
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from polypod.bodies import PLATFORM, STEEL, Link, leg_radii
+from polypod.answers.singularity import NEAR_SINGULAR
+from polypod.bodies.links import PLATFORM, STEEL, Link, leg_radii
+from polypod.bodies.palette import SKY, YELLOW, Rgb, rgb
+from polypod.bodies.rails import way
 from polypod.mechanism import Mechanism
-from polypod.rails import way
-from polypod.singularity import NEAR_SINGULAR
-from polypod.style import SKY, YELLOW
-from polypod.viewer.state import Level, Model, View
-from polypod.workspace import Workspace
+from polypod.viewer.model import Level, Model, View
+from polypod.workspaces.workspace import Workspace
 
 if TYPE_CHECKING:
     import viser
 
 Array = NDArray[np.float64]
-Rgb = tuple[int, int, int]
 
 RED = "#C1121F"
 """Beyond a limit: no leg has this colour."""
@@ -46,11 +45,6 @@ FIELD_OF_VIEW = np.radians(40.0)
 _CREASE = np.radians(30.0)
 _FADE = 10.0
 """The platform begins to change its colour at so many times `NEAR_SINGULAR`."""
-
-
-def rgb(color: str) -> Rgb:
-    """Red, green, blue from 0 to 255 of a colour such as #C9CDD3."""
-    return int(color[1:3], 16), int(color[3:5], 16), int(color[5:7], 16)
 
 
 def platform_color(sigma_min: float) -> Rgb:

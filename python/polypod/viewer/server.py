@@ -14,10 +14,10 @@ import numpy as np
 
 from polypod.errors import PolypodError
 from polypod.mechanism import Mechanism
-from polypod.motion import Motion
-from polypod.viewer.guard import is_own_page, is_update
+from polypod.motion.motion import Motion
+from polypod.viewer.message_filter import is_own_page, is_update
+from polypod.viewer.model import Model
 from polypod.viewer.player import Player, track_of
-from polypod.viewer.state import Model
 from polypod.viewer.worker import Worker
 
 LOCAL = ("127.0.0.1", "localhost", "::1")

@@ -10,12 +10,12 @@ from pathlib import Path
 
 import numpy as np
 
+from polypod.answers.singularity import NEAR_SINGULAR
 from polypod.mechanism import Mechanism
-from polypod.motion import Motion
-from polypod.singularity import NEAR_SINGULAR
+from polypod.motion.motion import Motion
+from polypod.viewer.model import Model
 from polypod.viewer.player import Player, Track, track_of
 from polypod.viewer.server import ViewerError, largest_force, require_viser
-from polypod.viewer.state import Model
 
 FRAMES_PER_SECOND = 30.0
 MOST_FRAMES = 600

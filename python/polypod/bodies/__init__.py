@@ -1,0 +1,1 @@
+"""The links of a mechanism as solid bodies, and their colours."""

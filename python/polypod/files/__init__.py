@@ -1,0 +1,1 @@
+"""Files from the outside: text, TOML, CSV, units, and the tables of a mechanism file."""

@@ -1,0 +1,1 @@
+"""Motions: coordinates over time, and the files that hold them."""

@@ -1,0 +1,23 @@
+"""Figures: the mechanism in space, workspaces, the paper's Fig. 4, the topology graph of its Fig. 1b.
+
+Each function draws on the axes or figure that it is given, or makes them with pyplot; none shows or saves.
+"""
+
+from polypod.plots.canvas import save_figure
+from polypod.plots.fig4 import fig4_panels, plot_fig4
+from polypod.plots.mechanism import plot_mechanism, plot_poses
+from polypod.plots.series import plot_series
+from polypod.plots.topology import plot_topology
+from polypod.plots.workspace import plot_workspace, plot_workspace_view
+
+__all__ = [
+    "fig4_panels",
+    "plot_fig4",
+    "plot_mechanism",
+    "plot_poses",
+    "plot_series",
+    "plot_topology",
+    "plot_workspace",
+    "plot_workspace_view",
+    "save_figure",
+]

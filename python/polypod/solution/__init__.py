@@ -1,0 +1,1 @@
+"""Motions and simulations solved, and what follows from a solution."""

@@ -1,0 +1,1 @@
+"""Mechanisms and solutions as plain data, and as tables of text."""

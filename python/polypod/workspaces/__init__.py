@@ -1,0 +1,1 @@
+"""Workspaces: reachable, sliced, or over a lattice of leg lengths; their boundary and their files."""
