@@ -13,7 +13,7 @@ from datetime import date
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
-from benchmarks import page, timing, workspace
+from benchmarks import page, start, timing, workspace
 from benchmarks.operations import Polypod
 from polypod import compute
 
@@ -145,6 +145,10 @@ def measure():
         for task in Polypod.tasks
         for row in operations(f"memory {task}", threads[-1], [MEASURED], MIMALLOC_PURGE_DELAY="0")
     ]
+    say("redundant actuators")
+    results["actuation"] = child("actuation", timeout=1800)
+    say("import, list and build")
+    results["start"] = {"commands": start.commands(), "build": start.build()}
     say("workspaces")
     results["workspaces"] = workspaces(threads[-1])
     say("Rust")

@@ -198,6 +198,29 @@ def workspaces_table(results):
     return table(("", "time", "peak of the process"), rows)
 
 
+def actuation_table(results):
+    rows, last = [], None
+    for row in results["actuation"]:
+        machine = f"{row['mechanism']}: {row['legs']} legs" if row["mechanism"] != last else ""
+        last = row["mechanism"]
+        name = NAMES.get(row["operation"], row["operation"].replace("_", " "))
+        redundant, square = (time(row[kind]["median"]) for kind in ("redundant", "square"))
+        rows.append((machine, name, redundant, square, digits(row["ratio"], 2)))
+    return table(("", "", "redundant", "just enough", "ratio"), rows)
+
+
+def start_table(results):
+    found = results["start"]
+    rows = [(f"`{row['what']}`", f"{time(1e9 * row['median'])}", spread_of(row)) for row in found["commands"]]
+    build = found["build"]
+    rows.append((f"{build['what']}, {build['cores']} cores", time(1e9 * build["seconds"]), ""))
+    return table(("", "time", "quartiles"), rows)
+
+
+def spread_of(row):
+    return f"{time(1e9 * row['low'])} to {time(1e9 * row['high'])}"
+
+
 TABLES = {
     "machine": machine_table,
     "comparison": comparison_table,
@@ -207,6 +230,8 @@ TABLES = {
     "rust": rust_table,
     "memory": memory_table,
     "workspaces": workspaces_table,
+    "actuation": actuation_table,
+    "start": start_table,
 }
 
 
