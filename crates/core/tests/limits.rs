@@ -10,11 +10,11 @@ use polypod_core::dynamics::inverse_dynamics;
 use polypod_core::kinematics::leg;
 use polypod_core::kinematics::passive_joints;
 use polypod_core::limits::margins::{binding, margins};
+use polypod_core::model::joint::JointKind;
 use polypod_core::model::limit::Zero;
 use polypod_core::model::limit::{Bound, Limit, Measure, Strut};
 use polypod_core::model::mechanism::Mechanism;
 use polypod_core::model::spec::Axes;
-use polypod_core::model::spec::JointKind;
 use polypod_core::spatial::distance::Hull;
 
 fn limit(measure: Measure, bound: Bound) -> Limit {

@@ -460,7 +460,7 @@ impl PyMechanism {
         let mech = &self.0;
         let row = |l: &Limit| {
             let (least, most) = l.bound.ends();
-            (l.name.clone(), l.kind(), l.legs(mech), l.unit(), least, most, l.scale)
+            (l.name.clone(), l.kind(), l.legs(mech), l.unit(mech), least, most, l.scale)
         };
         mech.limits.iter().map(row).collect()
     }

@@ -1,17 +1,18 @@
 //! From the description of a mechanism to the mechanism: what its parts must be to each other is checked here, on all
 //! parts that could be read, and every fault is reported at once.
 
+use crate::assembly::drives;
 use crate::kinematics::constraint;
 use crate::kinematics::leg;
 use crate::limits::margins;
 use crate::mobility::degrees_of_freedom;
+use crate::model::joint::{Joint, JointKind, Normal};
 use crate::model::mechanism::{
-    Body, Constraint, ConstraintKind, Direction, Drive, Joint, Leg, Load, Mechanism, Mobility, Rod, Turning,
+    Body, Constraint, ConstraintKind, Direction, Leg, Load, Mechanism, Mobility, Rod, Turning,
 };
 use crate::model::spec::Axes;
 use crate::model::spec::{
-    ANGLE_TOLERANCE, BodySpec, Fault, JointKind, JointSpec, LENGTH_TOLERANCE, LegSpec, RodSpec, SliderSpec,
-    Spec,
+    ANGLE_TOLERANCE, BodySpec, Fault, JointSpec, LENGTH_TOLERANCE, LegSpec, RodSpec, Spec,
 };
 use crate::number::real::count;
 use crate::number::real::{Constant, Scalar, Trig};
@@ -220,20 +221,8 @@ fn check_ends(spec: &Spec) -> Vec<Fault> {
 fn check_leg_at_home(spec: &Spec, place: &str, leg: &LegSpec, home: &Pose<f64>) -> Vec<Fault> {
     let mut faults = Vec::new();
     let e = home.rotation * leg.platform.point;
-    let mut r = home.o + e - leg.base.point;
-    if let Some(slider) = &leg.slider {
-        if !(slider.axis.norm() > 0.0 && slider.strut > 0.0) {
-            return faults;
-        }
-        faults.extend(check_slider(place, leg, slider));
-        match strut_at_home(slider, r) {
-            Ok(strut) => r = strut,
-            Err(message) => {
-                faults.push(Fault::new(format!("{place}.slider.strut"), message));
-                return faults;
-            }
-        }
-    }
+    let r = home.o + e - leg.base.point;
+    let Some(r) = drives::check(place, leg, r, &mut faults) else { return faults };
     if r.norm() <= LENGTH_TOLERANCE * (leg.base.point.norm() + e.norm() + home.o.norm()) || r.norm() == 0.0 {
         faults.push(Fault::new(place, "base point and platform point coincide at the home pose"));
         return faults;
@@ -258,21 +247,8 @@ fn check_leg_at_home(spec: &Spec, place: &str, leg: &LegSpec, home: &Pose<f64>) 
         };
         let (along, across) = (axis.dot(delta), axis.cross(delta).norm());
         let degrees = across.atan2(along).to_degrees();
-        let joint_kind = if joint.rod.is_some() { JointKind::Universal } else { joint.joint };
-        let (wrong, need) = match joint_kind {
-            JointKind::Universal => {
-                (across <= ANGLE_TOLERANCE, "the axis of a U joint (or its rod) must not lie along it")
-            }
-            JointKind::Revolute => {
-                (along.abs() > ANGLE_TOLERANCE, "the axis of an R joint must be square to it")
-            }
-            JointKind::Fixed => (
-                across > ANGLE_TOLERANCE || along < 0.0,
-                "the axis of an F joint must point along it, from B to b",
-            ),
-            JointKind::Spherical => (false, ""),
-        };
-        if wrong {
+        let kind = if joint.rod.is_some() { JointKind::WITH_ROD } else { joint.joint };
+        if let Some(need) = kind.misplaced(along, across, ANGLE_TOLERANCE) {
             let key = if joint.rod.is_some() { "rod" } else { "axis" };
             faults.push(Fault::new(
                 format!("{place}.{side}.{key}"),
@@ -282,56 +258,6 @@ fn check_leg_at_home(spec: &Spec, place: &str, leg: &LegSpec, home: &Pose<f64>) 
                 ),
             ));
         }
-    }
-    faults
-}
-
-/// The strut of a slider at home, from its foot to b; `r` is from the base point.
-fn strut_at_home(slider: &SliderSpec, r: Vec3<f64>) -> Result<Vec3<f64>, String> {
-    let axis = slider.axis.unit();
-    let across = r - axis * r.dot(axis);
-    let (far, strut) = (across.norm(), slider.strut);
-    let ahead = (strut * strut - far * far).sqrt();
-    if !(ahead > ANGLE_TOLERANCE * strut) {
-        return Err(format!(
-            "is {strut} m; the platform point is {far:.6} m from the rail at the home pose, which the strut must exceed: \
-             square to its rail it is singular"
-        ));
-    }
-    Ok(across + axis * (slider.branch * ahead))
-}
-
-/// Joints that a slider can have: those whose constraints do not say where the carriage is.
-fn check_slider(place: &str, leg: &LegSpec, slider: &SliderSpec) -> Vec<Fault> {
-    let mut faults = Vec::new();
-    let axis = slider.axis.unit();
-    let square = leg.base.axis.is_none_or(|own| own.unit().dot(axis).abs() <= ANGLE_TOLERANCE);
-    let along = leg.base.axis.is_none_or(|own| own.unit().cross(axis).norm() <= ANGLE_TOLERANCE);
-    if leg.base.rod.is_some() {
-        faults.push(Fault::new(format!("{place}.base.rod"), "a rod carries telescopic legs only"));
-        return faults;
-    }
-    let (above, below) = (leg.platform.joint, leg.base.joint);
-    match below {
-        JointKind::Revolute if !square => {
-            faults.push(Fault::new(
-                format!("{place}.base.axis"),
-                "must be square to the rail: R on a carriage",
-            ));
-        }
-        JointKind::Fixed => {
-            let message = "is F; the strut must turn on its carriage: give S, U or R";
-            faults.push(Fault::new(format!("{place}.base.joint"), message));
-        }
-        JointKind::Universal if above == JointKind::Universal && !along => {
-            let message = "must lie along the rail: U on a carriage, with U on the platform";
-            faults.push(Fault::new(format!("{place}.base.axis"), message));
-        }
-        _ => {}
-    }
-    if matches!(above, JointKind::Revolute | JointKind::Fixed) {
-        let message = format!("is {}; a slider has S or U on the platform", above.letter());
-        faults.push(Fault::new(format!("{place}.platform.joint"), message));
     }
     faults
 }
@@ -384,12 +310,11 @@ fn make_rod(spec: &Spec, index: usize, rod: &RodSpec) -> Rod {
 
 fn make_leg(spec: &LegSpec, rods: &[Rod], home: &Pose<f64>) -> Leg {
     let r = home.o + home.rotation * spec.platform.point - spec.base.point;
-    let strut = spec.slider.as_ref().and_then(|slider| strut_at_home(slider, r).ok());
-    let delta = strut.unwrap_or(r).unit();
+    let delta = drives::strut_at_home(spec, r).unwrap_or(r).unit();
     let rod = spec.base.rod;
     let mut base = make_joint(&spec.base, delta);
     if let Some(rod) = rod {
-        base.kind = JointKind::Universal;
+        base.kind = JointKind::WITH_ROD;
         base.axis = Some(rods[rod].axis);
     }
     let platform = make_joint(&spec.platform, home.rotation.transpose_mul(delta));
@@ -397,28 +322,15 @@ fn make_leg(spec: &LegSpec, rods: &[Rod], home: &Pose<f64>) -> Leg {
     Leg {
         name: spec.name.clone(),
         actuated: spec.actuated,
-        drive: spec.slider.as_ref().map_or(Drive::Telescope, |slider| Drive::Slider {
-            rail: slider.axis.unit(),
-            strut: slider.strut,
-            branch: slider.branch,
-        }),
+        drive: drives::make(spec),
         radius: spec.radius,
         base,
         platform,
         rod,
-        cylinder: match &spec.slider {
-            None => make_body(spec.cylinder.as_ref()),
-            Some(slider) => make_carriage(slider),
-        },
+        cylinder: drives::own_body(spec).unwrap_or_else(|| make_body(spec.cylinder.as_ref())),
         piston: make_body(spec.piston.as_ref()),
         turning,
     }
-}
-
-/// It does not turn: its inertia is of no effect.
-fn make_carriage(slider: &SliderSpec) -> Body {
-    let none = make_body(None);
-    slider.carriage.as_ref().map_or(none.clone(), |c| Body { mass: c.mass, center: c.center, ..none })
 }
 
 fn make_joint(spec: &JointSpec, direction: Vec3<f64>) -> Joint {
@@ -438,15 +350,12 @@ pub(crate) fn turning<S: Scalar>(base: &Joint<S>, platform: &Joint<S>) -> Option
 }
 
 fn turning_of<S: Scalar>(joint: &Joint<S>, side: Axes) -> Option<Turning<S>> {
-    match joint.kind {
-        JointKind::Spherical => None,
-        JointKind::Universal => joint.axis.map(|u| Turning::Across(side, u)),
-        JointKind::Revolute => joint.axis.map(|u| Turning::Along(side, u)),
-        JointKind::Fixed => joint.normal.map(|u| Turning::Along(side, u)),
-    }
+    joint.normal().map(|normal| match normal {
+        Normal::Across(u) => Turning::Across(side, u),
+        Normal::Along(u) => Turning::Along(side, u),
+    })
 }
 
 fn make_body(spec: Option<&BodySpec>) -> Body {
-    let none = Body { mass: 0.0, center: Vec3::zero(), inertia: Mat3([Vec3::zero(); 3]) };
-    spec.map_or(none, |b| Body { mass: b.mass, center: b.center, inertia: Mat3::from_rows(b.inertia) })
+    spec.map_or(Body::NONE, |b| Body { mass: b.mass, center: b.center, inertia: Mat3::from_rows(b.inertia) })
 }

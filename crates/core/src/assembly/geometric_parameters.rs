@@ -2,9 +2,10 @@
 
 use crate::assembly::build;
 use crate::kinematics::idle;
-use crate::model::mechanism::{Direction, Drive, Joint, Leg, Mechanism, Rod, Turning};
+use crate::model::drive::Vector;
+use crate::model::joint::Joint;
+use crate::model::mechanism::{Direction, Leg, Mechanism, Rod, Turning};
 use crate::model::spec::Axes;
-use crate::model::spec::JointKind;
 use crate::number::real::Dual;
 use crate::spatial::Vec3;
 
@@ -12,21 +13,9 @@ use crate::spatial::Vec3;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Place {
     Joint(usize, Axes),
-    /// Of a slider.
-    Rail(usize),
-    Strut(usize),
+    /// A leg's drive, and which of its parts.
+    Drive(usize, usize),
     Rod(usize),
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Vector {
-    Point,
-    /// A unit vector: a change along it is none.
-    Axis,
-    /// The same, of an F joint.
-    Normal,
-    /// One number.
-    Length,
 }
 
 /// One component of a point or an axis, in the axes of its body.
@@ -44,8 +33,10 @@ impl Parameter {
         let place = match self.place {
             Place::Joint(i, Axes::Base) => format!("leg {} base", mech.legs[i].name),
             Place::Joint(i, Axes::Platform) => format!("leg {} platform", mech.legs[i].name),
-            Place::Rail(i) => format!("leg {} rail", mech.legs[i].name),
-            Place::Strut(i) => format!("leg {} strut", mech.legs[i].name),
+            Place::Drive(i, part) => {
+                let Leg { name, drive, .. } = &mech.legs[i];
+                format!("leg {name} {}", drive.kind().parts[part].name)
+            }
             Place::Rod(i) => format!("rod {}", mech.rods[i].name),
         };
         let vector = match self.vector {
@@ -58,31 +49,23 @@ impl Parameter {
     }
 }
 
-/// All of them in order: base joint and platform joint of each leg, of a slider its rail and strut; rods. A leg on a rod
-/// has the rod's axis, no own.
+/// All of them in order: base joint and platform joint of each leg and the parts of its drive, as rail and strut; rods.
+/// A leg on a rod has the rod's axis, no own.
 #[must_use]
 pub fn parameters(mech: &Mechanism) -> Vec<Parameter> {
     let joints = mech.legs.iter().enumerate().flat_map(|(i, leg)| {
-        let of_joint = |(side, joint, rod): (Axes, &Joint, Option<usize>)| {
-            let vectors: &[Vector] = match joint.kind {
-                _ if rod.is_some() => &[Vector::Point],
-                JointKind::Spherical => &[Vector::Point],
-                JointKind::Universal | JointKind::Revolute => &[Vector::Point, Vector::Axis],
-                JointKind::Fixed => &[Vector::Point, Vector::Axis, Vector::Normal],
-            };
-            (Place::Joint(i, side), vectors)
+        let of_joint = move |(side, joint, rod): (Axes, &Joint, Option<usize>)| {
+            let (axis, normal) = (joint.kind.has_axis() && rod.is_none(), joint.kind.has_normal());
+            let own = [axis.then_some(Vector::Axis), normal.then_some(Vector::Normal)];
+            [Some(Vector::Point)].into_iter().chain(own).flatten().map(move |v| (Place::Joint(i, side), v))
         };
-        let slider: &[(Place, &[Vector])] = match leg.drive {
-            Drive::Telescope => &[],
-            Drive::Slider { .. } => {
-                &[(Place::Rail(i), &[Vector::Axis]), (Place::Strut(i), &[Vector::Length])]
-            }
-        };
-        let joints = [(Axes::Base, &leg.base, leg.rod), (Axes::Platform, &leg.platform, None)].map(of_joint);
-        joints.into_iter().chain(slider.to_vec())
+        let joints = [(Axes::Base, &leg.base, leg.rod), (Axes::Platform, &leg.platform, None)];
+        let parts = leg.drive.kind().parts.iter().enumerate();
+        let drive = parts.map(move |(k, part)| (Place::Drive(i, k), part.vector));
+        joints.into_iter().flat_map(of_joint).chain(drive)
     });
-    let rods = (0..mech.rods.len()).map(|i| (Place::Rod(i), &[Vector::Point, Vector::Axis][..]));
-    let vectors = joints.chain(rods).flat_map(|(place, vectors)| vectors.iter().map(move |&v| (place, v)));
+    let of_rod = |i: usize| [Vector::Point, Vector::Axis].map(|vector| (Place::Rod(i), vector));
+    let vectors = joints.chain((0..mech.rods.len()).flat_map(of_rod));
     let count = |vector: Vector| if vector == Vector::Length { 1 } else { 3 };
     vectors
         .flat_map(|(place, vector)| {
@@ -124,14 +107,13 @@ pub fn varied(mech: &Mechanism, by: Option<&Parameter>) -> Mechanism<Dual<f64>> 
         }
         let platform = joint(Place::Joint(i, Axes::Platform), &leg.platform);
         let turning = build::turning(&base, &platform);
-        let drive = match leg.drive {
-            Drive::Telescope => Drive::Telescope,
-            Drive::Slider { rail, strut, branch } => {
-                let varies = by.is_some_and(|by| by.place == Place::Strut(i));
-                let strut = Dual::new(strut, f64::from(u8::from(varies)));
-                Drive::Slider { rail: lift(Place::Rail(i), Vector::Axis, rail), strut, branch }
-            }
-        };
+        let drive = leg.drive.with(
+            |part, axis| lift(Place::Drive(i, part), Vector::Axis, axis),
+            |part, length| {
+                let varies = by.is_some_and(|by| by.place == Place::Drive(i, part));
+                Dual::new(length, f64::from(u8::from(varies)))
+            },
+        );
         Leg {
             name: leg.name.clone(),
             actuated: leg.actuated,

@@ -1,2 +1,3 @@
 pub mod build;
+mod drives;
 pub mod geometric_parameters;

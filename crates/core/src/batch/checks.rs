@@ -6,7 +6,7 @@ use crate::kinematics::constraint;
 use crate::kinematics::leg::{self, Position};
 use crate::limits::margins::Seen;
 use crate::model::limit::Limit;
-use crate::model::mechanism::{Constraint, Drive, Leg, Mechanism, Turning};
+use crate::model::mechanism::{Constraint, Leg, Mechanism, Turning};
 use crate::model::status::Status;
 use crate::number::lanes::{self, Lanes, Row, Task, WIDTH};
 use crate::number::real::{Ordered, Real};
@@ -102,17 +102,14 @@ pub(super) fn with_leg<V: Lanes>(
     normal: V,
     codes: Codes<V>,
 ) -> Codes<V> {
-    let codes = match leg.drive {
-        Drive::Telescope => {
-            let least = V::lit(LEG_TOLERANCE * mech.characteristic_length);
-            codes.unless(p.length.greater(least), Status::Singular)
-        }
-        Drive::Slider { .. } => {
-            let leans = leg::transmission(leg, p).abs();
-            codes
-                .unless(finite(&[p.coordinate]), Status::OutOfReach)
-                .unless(leans.greater(V::lit(LEG_TOLERANCE)), Status::Singular)
-        }
+    let codes = if leg.drive.moves_foot() {
+        let leans = leg::transmission(leg, p).abs();
+        codes
+            .unless(finite(&[p.coordinate]), Status::OutOfReach)
+            .unless(leans.greater(V::lit(LEG_TOLERANCE)), Status::Singular)
+    } else {
+        let least = V::lit(LEG_TOLERANCE * mech.characteristic_length);
+        codes.unless(p.length.greater(least), Status::Singular)
     };
     match leg.turning {
         Turning::Across(..) => {
@@ -126,7 +123,7 @@ pub(super) fn with_leg<V: Lanes>(
 #[inline(always)]
 pub(super) fn reached<V: Lanes>(mech: &Mechanism, pose: &Pose<V>, mut codes: Codes<V>) -> Codes<V> {
     for leg in &mech.legs {
-        if let Drive::Slider { .. } = leg.drive {
+        if leg.drive.moves_foot() {
             codes = codes.unless(finite(&[leg::position(leg, pose).coordinate]), Status::OutOfReach);
         }
     }

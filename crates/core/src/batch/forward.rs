@@ -9,11 +9,11 @@ use crate::forward_kinematics::newton::{self, Asked, Found, asked_of_all};
 use crate::forward_kinematics::newton_lanes::{forward_kinematics_of, load_asked, put_numbers};
 use crate::kinematics::leg;
 use crate::limits::margins::Seen;
-use crate::model::mechanism::{Drive, Mechanism};
+use crate::model::mechanism::Mechanism;
 use crate::model::status::Status;
 use crate::number::lanes::{self, Lanes, Row, Task, WIDTH};
+use crate::spatial::Pose;
 use crate::spatial::packed_poses::{Poses, load, put};
-use crate::spatial::{Pose, Vec3};
 
 /// The pose for each set of lengths of all legs (those of passive legs are not read), in the assembly mode of its
 /// guess: one for each state or one for all. `continued` starts each state from the last one that was solved, and tells
@@ -199,11 +199,9 @@ fn on_branch<V: Lanes>(
 ) -> Codes<V> {
     let mut count = 0;
     for leg in &mech.legs {
-        if let Drive::Slider { rail, branch, .. } = leg.drive
-            && leg.actuated
-        {
+        if leg.actuated && leg.drive.moves_foot() {
             let r = asked[count].vector(leg, leg::vectors(leg, pose).1);
-            let leans = r.dot(Vec3::lift(rail)).scale(branch);
+            let leans = leg.drive.leans(r);
             codes = codes.unless(leans.greater(V::zero()), Status::OtherBranch);
         }
         count += usize::from(leg.actuated);

@@ -10,7 +10,7 @@ use crate::dynamics::inverse_dynamics::{leg_wrench, load_in_base, own_wrench};
 use crate::kinematics::coordinate_sets::{self, Following, Set, Values, Variation, Varying};
 use crate::kinematics::leg;
 use crate::kinematics::rows::{self, Row, RowNumbers};
-use crate::model::mechanism::{Drive, Leg, Mechanism};
+use crate::model::mechanism::{Leg, Mechanism};
 use crate::model::spec::Axes;
 use crate::number::lanes::Lanes;
 use crate::number::real::{Constant, Dual, Jet, Real};
@@ -282,10 +282,7 @@ impl Varied {
         let mech = geometric_parameters::varied(mech, Some(by));
         let varies = |a: Vec3<Dual<f64>>| a.array().iter().any(|x| x.d != 0.0);
         let leg_varies = |leg: &Leg<Dual<f64>>| {
-            let drive = match leg.drive {
-                Drive::Telescope => false,
-                Drive::Slider { rail, strut, .. } => varies(rail) || strut.d != 0.0,
-            };
+            let drive = leg.drive.numbers().iter().any(|x| x.d != 0.0);
             drive || varies(leg.base.point) || varies(leg.platform.point) || varies(leg.turning.axis())
         };
         let legs = (0..mech.legs.len()).filter(|&i| leg_varies(&mech.legs[i])).collect();

@@ -4,7 +4,7 @@
 use crate::kinematics::jacobian::scaled;
 use crate::kinematics::leg;
 use crate::kinematics::rows::{self, Matrix6};
-use crate::model::mechanism::{Body, Drive, Leg, Mechanism, Rod};
+use crate::model::mechanism::{Body, Leg, Mechanism, Rod};
 use crate::model::spec::Axes;
 use crate::number::real::{Constant, Real};
 use crate::numerics::gauss::solve;
@@ -97,21 +97,17 @@ pub(crate) fn links_wrench<T: Real>(
     let at_base = axes.transpose_mul(Vec3::lift(mech.gravity));
     let at_b = at_base - axes.transpose_mul(state.end.a_b);
     let (force, about_b) = turning_force(piston, &state.turn, at_b);
-    match leg.drive {
-        Drive::Telescope => {
-            let (_, about_base) = turning_force(cylinder, &state.turn, at_base);
-            // Both turn as one.
-            let inertia = piston.inertia + cylinder.inertia;
-            let torque = turning_torque(inertia, state.turn.omega, state.turn.eps);
-            leg::carry(leg, state, force, torque + about_b + about_base)
-        }
-        Drive::Slider { rail, .. } => {
-            let torque = turning_torque(piston.inertia, state.turn.omega, state.turn.eps);
-            // The carriage's power is what pushes it along the rail, times q'.
-            let push = Vec3::lift(mech.gravity).dot(Vec3::lift(rail)) - state.end.acceleration;
-            let carriage = leg::row(leg, &state.position) * push.scale(cylinder.mass);
-            leg::carry(leg, state, force, torque + about_b) + carriage
-        }
+    if leg.drive.moves_foot() {
+        let torque = turning_torque(piston.inertia, state.turn.omega, state.turn.eps);
+        // The first link's power is what pushes it along the coordinate, times q'.
+        let push = leg.drive.own_force(cylinder, Vec3::lift(mech.gravity), state);
+        leg::carry(leg, state, force, torque + about_b) + leg::row(leg, &state.position) * push
+    } else {
+        let (_, about_base) = turning_force(cylinder, &state.turn, at_base);
+        // Both turn as one.
+        let inertia = piston.inertia + cylinder.inertia;
+        let torque = turning_torque(inertia, state.turn.omega, state.turn.eps);
+        leg::carry(leg, state, force, torque + about_b + about_base)
     }
 }
 
@@ -281,8 +277,9 @@ pub fn energy<T: Real>(mech: &Mechanism<impl Constant<T>>, pose: &Pose<T>, twist
         let place = foot + state.position.r + piston.offset;
         sum = with_energy(sum, mech, &leg.piston, axes, omega, piston.velocity, place);
         let place = foot + cylinder.offset;
-        // A carriage has no inertia here, as it does not turn.
-        sum = with_energy(sum, mech, &leg.cylinder, axes, omega, cylinder.velocity, place);
+        let (own_axes, turn) = leg.drive.first_turn(&state);
+        let own_omega = own_axes * turn.omega;
+        sum = with_energy(sum, mech, &leg.cylinder, own_axes, own_omega, cylinder.velocity, place);
         for rod in &mech.rods {
             if rod.leader == i {
                 let (axis, n) = (Vec3::lift(rod.axis), state.frame.n());

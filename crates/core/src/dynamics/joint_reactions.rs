@@ -6,8 +6,8 @@
 
 use crate::dynamics::inverse_dynamics::{inertial_force, platform_wrench, rod_wrench, turning_torque};
 use crate::kinematics::leg;
-use crate::model::mechanism::{Body, ConstraintKind, Drive, Leg, Mechanism};
-use crate::model::spec::JointKind;
+use crate::model::joint::{JointKind, Normal};
+use crate::model::mechanism::{Body, ConstraintKind, Leg, Mechanism};
 use crate::number::real::Real;
 use crate::spatial::{Mat3, Motion, Pose, Vec3, Wrench};
 
@@ -33,41 +33,26 @@ pub fn joints(mech: &Mechanism) -> Vec<Joint> {
     };
     let rod_name = |rod: usize| format!("rod {}", mech.rods[rod].name);
     for r in 0..mech.rods.len() {
-        add("R", rod_name(r), ["base".into(), rod_name(r)], turns(JointKind::Revolute));
+        add("R", rod_name(r), ["base".into(), rod_name(r)], JointKind::ON_ROD.free());
     }
     for leg in &mech.legs {
-        let (ground, below) = match leg.rod {
-            Some(rod) => (rod_name(rod), JointKind::Revolute),
-            None => ("base".into(), leg.base.kind),
-        };
+        let (ground, below) = (leg.rod.map_or_else(|| "base".into(), rod_name), leg.base_kind());
         let [first, second] = leg.links().map(|link| format!("{link} {}", leg.name));
         let above = leg.platform.kind;
         // The prismatic joint carries the active force along its direction, and nothing there if it is passive.
-        let slide: &[usize] = if leg.actuated { &[] } else { &[1] };
-        let (base_joint, prismatic) = match leg.drive {
-            Drive::Telescope => ([ground, first.clone()], [first, second.clone()]),
-            Drive::Slider { .. } => ([first.clone(), second.clone()], [ground, first]),
-        };
-        add(below.letter(), format!("base joint {}", leg.name), base_joint, turns(below));
-        add("P", format!("prismatic {}", leg.name), prismatic, slide);
+        let active = [leg.drive.kind().active];
+        let slide: &[usize] = if leg.actuated { &[] } else { &active };
+        let [base_joint, prismatic] = leg.drive.between([ground, first, second.clone()]);
+        add(below.letter(), format!("base joint {}", leg.name), base_joint, below.free());
+        add(leg.drive.kind().letter, format!("prismatic {}", leg.name), prismatic, slide);
         add(
             above.letter(),
             format!("platform joint {}", leg.name),
             [second, "platform".into()],
-            turns(above),
+            above.free(),
         );
     }
     all
-}
-
-/// Torques that a joint leaves free, in its axes.
-fn turns(kind: JointKind) -> &'static [usize] {
-    match kind {
-        JointKind::Spherical => &[3, 4, 5],
-        JointKind::Universal => &[3, 4],
-        JointKind::Revolute => &[3],
-        JointKind::Fixed => &[],
-    }
 }
 
 /// A joint's point and its axes as columns, both in base axes \[T44\].
@@ -115,23 +100,17 @@ pub(crate) fn put_places<T: Real>(mech: &Mechanism, pose: &Pose<T>, all: &mut [P
 /// Base joint at B, prismatic joint at b, platform joint at b; of a slider the first two at the strut's foot.
 #[inline(always)]
 fn leg_places<T: Real>(leg: &Leg, pose: &Pose<T>, p: &leg::Position<T>, axes: &Mat3<T>) -> [Place<T>; 3] {
-    let below = match (leg.rod, leg.base.kind, leg.base.axis) {
-        (None, JointKind::Universal, Some(u)) => universal(Vec3::lift(u), axes.0[0]),
+    let below = match (leg.rod, leg.base.normal()) {
+        (None, Some(Normal::Across(u))) => universal(Vec3::lift(u), axes.0[0]),
         _ => *axes,
     };
-    let above = match (leg.platform.kind, leg.platform.axis) {
-        (JointKind::Universal, Some(u)) => universal(pose.rotation.of(u), axes.0[0]),
+    let above = match leg.platform.normal() {
+        Some(Normal::Across(u)) => universal(pose.rotation.of(u), axes.0[0]),
         _ => *axes,
     };
     let (base, end) = (leg::foot(leg, p), pose.o + p.e);
-    let slide = match leg.drive {
-        Drive::Telescope => Place { point: end, axes: *axes },
-        Drive::Slider { rail, .. } => {
-            let across = rail.perpendicular();
-            let axes = Mat3::from_columns(across, rail, across.cross(rail));
-            Place { point: base, axes: Mat3::lift(axes) }
-        }
-    };
+    let (point, along) = leg.drive.joint([Vec3::lift(leg.base.point), base, end], axes);
+    let slide = Place { point, axes: along };
     [Place { point: base, axes: below }, slide, Place { point: end, axes: above }]
 }
 
@@ -176,8 +155,8 @@ impl<T: Real> Given<T> {
             let state = leg::state(leg, platform);
             let (cylinder, piston) = (leg::cylinder(leg, &state), leg::piston(leg, &state));
             self.legs[i] = [
-                link_wrench(&leg.cylinder, gravity, &cylinder, &state),
-                link_wrench(&leg.piston, gravity, &piston, &state),
+                link_wrench(&leg.cylinder, gravity, &cylinder, leg.drive.first_turn(&state)),
+                link_wrench(&leg.piston, gravity, &piston, (state.frame.axes, state.turn)),
             ];
             for (r, rod) in mech.rods.iter().enumerate() {
                 if rod.leader == i {
@@ -194,10 +173,9 @@ fn link_wrench<T: Real>(
     body: &Body,
     gravity: Vec3<T>,
     center: &leg::PointMotion<T>,
-    state: &leg::State<T>,
+    (axes, turn): (Mat3<T>, leg::Turn<T>),
 ) -> Wrench<T> {
-    // A carriage, which does not turn, has no inertia here.
-    let torque = state.frame.axes * turning_torque(body.inertia, state.turn.omega, state.turn.eps);
+    let torque = axes * turning_torque(body.inertia, turn.omega, turn.eps);
     let force = inertial_force(body, gravity, center.acceleration);
     Wrench::new(force, center.offset.cross(force) + torque)
 }
@@ -238,10 +216,8 @@ pub(crate) fn put_reactions<T: Real>(
         if let Some(rod) = leg.rod {
             all[rod] = all[rod] + on_first.moved(base - places[rod].point);
         }
-        let (base_joint, prismatic) = match leg.drive {
-            Drive::Telescope => (on_first, on_second),
-            Drive::Slider { .. } => (at_base, on_first),
-        };
+        let (base_joint, prismatic) =
+            if leg.drive.moves_foot() { (at_base, on_first) } else { (on_first, on_second) };
         (all[below], all[below + 1], all[below + 2]) = (base_joint, prismatic, on_platform[i]);
     }
 }
@@ -315,11 +291,7 @@ pub(crate) fn constraint_wrench<T: Real>(
             let (above, p) = (platform_joint(mech, i), leg::position(leg, pose));
             sum = sum + reactions[above].moved(places[above].point - pose.o);
             if leg.actuated {
-                let along = match leg.drive {
-                    Drive::Telescope => p.delta,
-                    Drive::Slider { rail, .. } => Vec3::lift(rail),
-                };
-                sum = sum - leg::row(leg, &p) * reactions[above - 1].force.dot(along);
+                sum = sum - leg::row(leg, &p) * leg.drive.active(reactions[above - 1], &p);
             }
         }
     }

@@ -4,7 +4,7 @@
 use crate::dynamics::force_balance::UnitForceResponse;
 use crate::dynamics::inverse_dynamics;
 use crate::kinematics::leg;
-use crate::model::mechanism::{Body, Drive, Leg, Mechanism, Turning};
+use crate::model::mechanism::{Body, Leg, Mechanism, Turning};
 use crate::number::real::{Dual, Real};
 use crate::spatial::{Mat3, Motion, Twist, Vec3, Wrench};
 
@@ -46,9 +46,6 @@ const EACH: [&[usize]; NUMBERS] = [&[0], &[1], &[2], &[3], &[4], &[5], &[6], &[7
 
 /// What a body has that is symmetric about its leg, as it must be where the leg spins freely: I_xx and I_zz are one.
 const SYMMETRIC: [&[usize]; 4] = [&[0], &[2], &[4, 9], &[7]];
-
-/// What a body has that does not turn and is held by a rail: its mass.
-const SLIDING: [&[usize]; 1] = [&[0]];
 
 /// One inertial parameter of a link.
 #[derive(Clone, Copy, Debug)]
@@ -92,10 +89,7 @@ fn spins_freely(leg: &Leg) -> bool {
 pub fn parameters(mech: &Mechanism) -> Vec<Parameter> {
     let legs = mech.legs.iter().enumerate().flat_map(|(i, leg)| {
         let numbers: &[&[usize]] = if spins_freely(leg) { &SYMMETRIC } else { &EACH };
-        let first: &[&[usize]] = match leg.drive {
-            Drive::Telescope => numbers,
-            Drive::Slider { .. } => &SLIDING,
-        };
+        let first = leg.drive.kind().own_numbers.unwrap_or(numbers);
         [(Link::Cylinder(i), first), (Link::Piston(i), numbers)]
     });
     let rods = (0..mech.rods.len()).map(|i| (Link::Rod(i), &EACH[..]));

@@ -6,8 +6,9 @@ use crate::dynamics::joint_reactions::{
     Given, Joint, Place, constraint_wrench, pure, put_places, put_reactions, put_unbalanced,
 };
 use crate::kinematics::idle;
-use crate::model::mechanism::{Drive, Mechanism};
-use crate::model::spec::JointKind;
+use crate::model::drive::Drive;
+use crate::model::joint::JointKind;
+use crate::model::mechanism::Mechanism;
 use crate::number::lanes::{Lanes, any};
 use crate::number::real::{Mask, Real};
 use crate::numerics::householder::Householder;
@@ -141,9 +142,10 @@ impl<V: Lanes> LegBalance<V> {
         // What is given above the joint, at its point.
         let at_base = second.moved(end - places[0].point);
         let both = pure(at_base + first, length);
-        let given = match drive {
-            Drive::Telescope => [both, pure(second, length), Wrench::zero()],
-            Drive::Slider { .. } => [pure(at_base, length), both, Wrench::zero()],
+        let given = if drive.moves_foot() {
+            [pure(at_base, length), both, Wrench::zero()]
+        } else {
+            [both, pure(second, length), Wrench::zero()]
         };
         let mut rhs = [V::zero(); 6];
         for row in 0..self.free.len() {

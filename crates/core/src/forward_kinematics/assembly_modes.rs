@@ -11,7 +11,7 @@ use crate::forward_kinematics::start_system::Products;
 use crate::kinematics::leg;
 use crate::mobility::sufficient_actuators::sufficient_actuators;
 use crate::model::mechanism::Idle;
-use crate::model::mechanism::{Drive, Leg, Mechanism};
+use crate::model::mechanism::{Leg, Mechanism};
 use crate::model::spec::Axes;
 use crate::model::status::Status;
 use crate::number::real::Real;
@@ -197,8 +197,7 @@ fn search(mech: &Mechanism, draw: &mut Draw) -> Option<Start> {
 
 /// What the home pose meets.
 fn at_home(mech: &Mechanism, leg: &Leg) -> Asked<C> {
-    let Asked { place, square } =
-        Asked::of(leg, newton::number_of(leg, leg::position(leg, &mech.home).coordinate));
+    let Asked { place, square } = Asked::of(leg, leg.drive.number(leg::position(leg, &mech.home).coordinate));
     Asked { place: C::lit(place), square: C::lit(square) }
 }
 
@@ -208,8 +207,8 @@ fn generic(mech: &Mechanism, draw: &mut Draw) -> [Asked<C>; 6] {
     for ((asked, (_, leg)), drawn) in asked.iter_mut().zip(mech.actuated()).zip(drawn) {
         let Asked { place, square } = at_home(mech, leg);
         *asked = Asked { place, square: square * (C::lit(1.0) + drawn) };
-        if let Drive::Slider { strut, .. } = leg.drive {
-            asked.place = place + draw.complex().scale(strut * GENERIC);
+        if leg.drive.moves_foot() {
+            asked.place = place + draw.complex().scale(leg.drive.travel() * GENERIC);
         }
     }
     asked

@@ -7,7 +7,7 @@ use crate::kinematics::constraint;
 use crate::kinematics::idle;
 use crate::kinematics::leg;
 use crate::kinematics::rows::{self, Row};
-use crate::model::mechanism::{Drive, Leg, Mechanism};
+use crate::model::mechanism::{Leg, Mechanism};
 use crate::model::status::Status;
 use crate::number::real::{Ordered, Real};
 use crate::numerics::gauss::solve;
@@ -60,10 +60,8 @@ impl<T: Real> Asked<T> {
     /// From the one number that varies: the squared length of a telescopic leg, the place of a carriage.
     #[inline(always)]
     pub fn of(leg: &Leg, number: T) -> Self {
-        match leg.drive {
-            Drive::Telescope => Asked { place: T::zero(), square: number },
-            Drive::Slider { strut, .. } => Asked { place: number, square: T::lit(strut * strut) },
-        }
+        let (place, square) = leg.drive.asked(number);
+        Asked { place, square }
     }
 
     /// Nothing.
@@ -75,19 +73,13 @@ impl<T: Real> Asked<T> {
     /// r from the foot that is asked for, given that from B.
     #[inline(always)]
     pub fn vector(&self, leg: &Leg, r: Vec3<T>) -> Vec3<T> {
-        match leg.drive {
-            Drive::Telescope => r,
-            Drive::Slider { rail, .. } => r - Vec3::lift(rail) * self.place,
-        }
+        leg.drive.vector(r, self.place)
     }
 
     /// The rate of `(ℓ² - r·r)/2` when what is asked for changes; r as above.
     #[inline(always)]
     pub fn change(leg: &Leg, r: Vec3<T>, rate: &Asked<T>) -> T {
-        match leg.drive {
-            Drive::Telescope => rate.square.scale(0.5),
-            Drive::Slider { rail, .. } => rate.square.scale(0.5) + r.dot(Vec3::lift(rail)) * rate.place,
-        }
+        leg.drive.asked_rate(r, rate.place, rate.square)
     }
 }
 
@@ -138,18 +130,9 @@ impl<T: Real> System<T> {
 pub fn numbers(mech: &Mechanism, coordinates: &[f64]) -> [f64; 6] {
     let mut numbers = [0.0; 6];
     for ((number, (_, leg)), &q) in numbers.iter_mut().zip(mech.actuated()).zip(coordinates) {
-        *number = number_of(leg, q);
+        *number = leg.drive.number(q);
     }
     numbers
-}
-
-/// That of one leg.
-#[must_use]
-pub fn number_of(leg: &Leg, coordinate: f64) -> f64 {
-    match leg.drive {
-        Drive::Telescope => coordinate * coordinate,
-        Drive::Slider { .. } => coordinate,
-    }
 }
 
 /// What is asked of the actuated legs, at most six.
@@ -164,16 +147,13 @@ pub fn asked(mech: &Mechanism, coordinates: &[f64]) -> [Asked<f64>; 6] {
 
 /// The same, however many they are.
 pub fn asked_of_all(mech: &Mechanism, coordinates: &[f64]) -> impl Iterator<Item = Asked<f64>> {
-    mech.actuated().zip(coordinates).map(|((_, leg), &q)| Asked::of(leg, number_of(leg, q)))
+    mech.actuated().zip(coordinates).map(|((_, leg), &q)| Asked::of(leg, leg.drive.number(q)))
 }
 
 /// Whether actuated legs can have these coordinates: numbers, and lengths none below zero.
 #[must_use]
 pub fn are_coordinates(mech: &Mechanism, coordinates: &[f64]) -> bool {
-    mech.actuated().zip(coordinates).all(|((_, leg), q)| match leg.drive {
-        Drive::Telescope => *q >= 0.0 && q.is_finite(),
-        Drive::Slider { .. } => q.is_finite(),
-    })
+    mech.actuated().zip(coordinates).all(|((_, leg), q)| *q >= leg.drive.kind().least && q.is_finite())
 }
 
 /// A solution (v/Λ, ω) of the system as a step of the pose.

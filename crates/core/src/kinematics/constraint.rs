@@ -3,8 +3,9 @@
 
 use crate::kinematics::leg;
 use crate::kinematics::quadratic_forms::{Hessian, add_centripetal, add_mixed, point_columns};
-use crate::model::mechanism::{Constraint, ConstraintKind, Joint, Leg, Mechanism, Partner};
-use crate::model::spec::{ANGLE_TOLERANCE, JointKind, LENGTH_TOLERANCE};
+use crate::model::joint::Normal;
+use crate::model::mechanism::{Constraint, ConstraintKind, Leg, Mechanism, Partner};
+use crate::model::spec::{ANGLE_TOLERANCE, LENGTH_TOLERANCE};
 use crate::number::real::{Constant, Ordered, Real, Scalar, Trig};
 use crate::spatial::{Mat3, Pose, Vec3, Wrench};
 
@@ -22,19 +23,11 @@ pub fn of_leg<S: Scalar>(index: usize, leg: &Leg<S>) -> Vec<Constraint<S>> {
         partner: Partner { base_point: none, platform_point: none, turn: Mat3::identity() },
     };
     // A fixed joint holds δ as well: the leg is square to two axes of the body.
-    let square = |kind: JointKind, axis: Option<Vec3<S>>, normal: Option<Vec3<S>>| match (kind, axis, normal)
-    {
-        (JointKind::Revolute, Some(a), _) => vec![a],
-        (JointKind::Fixed, Some(d), Some(n)) => vec![n, n.cross(d)],
-        _ => vec![],
-    };
-    let below = square(leg.base.kind, leg.base.axis, leg.base.normal);
-    let above = square(leg.platform.kind, leg.platform.axis, leg.platform.normal);
+    let (below, above) = (leg.base.square_to_leg(), leg.platform.square_to_leg());
     let b = below.iter().map(|&a| make(ConstraintKind::B, a, none));
     let c = above.iter().map(|&a| make(ConstraintKind::C, none, a));
     let d = |base_axis, platform_axis| make(ConstraintKind::D, base_axis, platform_axis);
-    let (base, platform) = (normal_of(leg.base.kind, &leg.base), normal_of(leg.platform.kind, &leg.platform));
-    match (base, platform) {
+    match (leg.base.normal(), leg.platform.normal()) {
         (None, _) | (_, None) => b.chain(c).collect(),
         (Some(Normal::Across(u)), Some(Normal::Across(w))) => vec![make(ConstraintKind::A, u, w)],
         (Some(Normal::Along(a)), Some(Normal::Across(w))) => b.chain([d(a, w)]).collect(),
@@ -103,21 +96,6 @@ pub fn of_rod<S: Trig + Constant<S>>(
         (a - b).norm() > LENGTH_TOLERANCE * a.norm().max(b.norm())
     };
     others.iter().filter(apart).map(make).collect()
-}
-
-/// What a joint says about the leg's normal n: square to an axis of its body, or along one.
-enum Normal<S> {
-    Across(Vec3<S>),
-    Along(Vec3<S>),
-}
-
-fn normal_of<S: Scalar>(kind: JointKind, joint: &Joint<S>) -> Option<Normal<S>> {
-    match kind {
-        JointKind::Spherical => None,
-        JointKind::Universal => joint.axis.map(Normal::Across),
-        JointKind::Revolute => joint.axis.map(Normal::Along),
-        JointKind::Fixed => joint.normal.map(Normal::Along),
-    }
 }
 
 /// Vectors of a constraint at a pose, base axes.

@@ -1,25 +1,11 @@
 //! One leg: where it is, how its platform end moves, how it turns, and how its links move.
 
-use crate::kinematics::quadratic_forms::{Hessian, add_centripetal, point_columns};
-use crate::model::mechanism::{Direction, Drive, Leg, Mechanism, Turning};
+pub use crate::kinematics::leg_state::{End, Frame, PointMotion, Position, State, Turn};
+use crate::kinematics::quadratic_forms::Hessian;
+use crate::model::mechanism::{Direction, Leg, Mechanism, Turning};
 use crate::model::spec::Axes;
 use crate::number::real::{Constant, Ordered, Real};
 use crate::spatial::{Mat3, Motion, Pose, Vec3, Wrench};
-
-/// Where the leg is, base axes \[T1\] \[T67\].
-#[derive(Clone, Copy, Debug)]
-pub struct Position<T> {
-    /// From o to b.
-    pub e: Vec3<T>,
-    /// From the strut's foot to b: from B, or from the carriage of a slider.
-    pub r: Vec3<T>,
-    /// Of the strut.
-    pub length: T,
-    /// Unit vector of r.
-    pub delta: Vec3<T>,
-    /// Of the prismatic joint: the length ℓ, or the place q of the carriage.
-    pub coordinate: T,
-}
 
 /// e from o to b and r from B to b.
 #[inline(always)]
@@ -33,20 +19,7 @@ pub fn vectors<T: Real>(leg: &Leg<impl Constant<T>>, pose: &Pose<T>) -> (Vec3<T>
 #[inline(always)]
 pub fn position<T: Real>(leg: &Leg<impl Constant<T>>, pose: &Pose<T>) -> Position<T> {
     let (e, r) = vectors(leg, pose);
-    match leg.drive {
-        Drive::Telescope => {
-            let length = r.norm();
-            Position { e, r, length, delta: r * (T::one() / length), coordinate: length }
-        }
-        Drive::Slider { rail, strut, branch } => {
-            let (a, c) = (Vec3::lift(rail), strut.lift());
-            let along = a.dot(r);
-            let across = r - a * along;
-            let ahead = (c * c - across.dot(across)).sqrt().scale(branch);
-            let r = across + a * ahead;
-            Position { e, r, length: c, delta: r * (T::one() / c), coordinate: along - ahead }
-        }
-    }
+    leg.drive.position(e, r)
 }
 
 /// r·d, d being the direction that a fixed joint gives to the leg: its length, or less than zero where the leg would have to
@@ -63,61 +36,26 @@ pub fn ahead<S: Constant<T>, T: Real>(mech: &Mechanism<S>, direction: &Direction
 /// Where the strut begins, base axes.
 #[inline(always)]
 pub fn foot<T: Real>(leg: &Leg<impl Constant<T>>, p: &Position<T>) -> Vec3<T> {
-    let base = Vec3::lift(leg.base.point);
-    match leg.drive {
-        Drive::Telescope => base,
-        Drive::Slider { rail, .. } => base + Vec3::<T>::lift(rail) * p.coordinate,
-    }
+    leg.drive.foot(Vec3::lift(leg.base.point), p)
 }
 
 /// δ·d, d being the direction of the prismatic joint: one of a telescopic leg, zero where a strut is square to its rail.
 #[inline(always)]
 pub fn transmission<T: Real>(leg: &Leg<impl Constant<T>>, p: &Position<T>) -> T {
-    match leg.drive {
-        Drive::Telescope => T::one(),
-        Drive::Slider { rail, .. } => p.delta.dot(Vec3::lift(rail)),
-    }
+    leg.drive.transmission(p)
 }
 
 /// The wrench of a unit force of the actuator, a row of the Jacobian [Eq. 6] \[T68\].
 #[inline(always)]
 pub fn row<T: Real>(leg: &Leg<impl Constant<T>>, p: &Position<T>) -> Wrench<T> {
-    match leg.drive {
-        Drive::Telescope => Wrench::at(p.e, p.delta),
-        Drive::Slider { .. } => Wrench::at(p.e, p.delta * (T::one() / transmission(leg, p))),
-    }
+    leg.drive.row(p)
 }
 
 /// The symmetric h with `ℓ'' = (δ, e×δ)·A + Vᵀ h V` \[T11\], the symmetric part of [Eq. 15]; of a slider with
 /// `q'' = (δ, e×δ)·A/(δ·a) + Vᵀ h V` \[T68\].
 #[inline(always)]
 pub fn hessian<T: Real>(leg: &Leg<impl Constant<T>>, p: &Position<T>) -> Hessian<T> {
-    // (δ·d) q'' = δ·a_b + |P v_b|²/ℓ with P = 1 - dδᵀ/(δ·d).
-    let mut h = [[T::zero(); 6]; 6];
-    add_centripetal(&mut h, p.e, p.delta);
-    let inverse = T::one() / p.length;
-    let mut columns = point_columns(p.e);
-    let along = match leg.drive {
-        Drive::Telescope => p.delta,
-        Drive::Slider { rail, .. } => Vec3::<T>::lift(rail) * (T::one() / transmission(leg, p)),
-    };
-    for v in &mut columns {
-        *v = *v - along * p.delta.dot(*v);
-    }
-    for i in 0..6 {
-        for j in 0..6 {
-            h[i][j] = columns[i].dot(columns[j]).mul_add(inverse, h[i][j]);
-        }
-    }
-    if let Drive::Slider { .. } = leg.drive {
-        let inverse = T::one() / transmission(leg, p);
-        for row in &mut h {
-            for x in row {
-                *x = *x * inverse;
-            }
-        }
-    }
-    h
+    leg.drive.hessian(p)
 }
 
 /// The unit axis behind a leg's frame in base axes, and whether it turns with the platform.
@@ -130,24 +68,6 @@ pub(crate) fn turning_axis<T: Real>(turning: Turning<impl Constant<T>>, pose: &P
         Turning::Across(Axes::Base, u) | Turning::Along(Axes::Base, u) | Turning::Free(u) => {
             (Vec3::lift(u), false)
         }
-    }
-}
-
-/// The leg's frame at a pose, and what the spin needs of it \[T5\].
-#[derive(Clone, Copy, Debug)]
-pub struct Frame<T> {
-    /// Columns n, δ, m = n×δ.
-    pub axes: Mat3<T>,
-    /// |u×δ|: zero where a U joint's axis lies along the leg, one for an R or F joint.
-    pub sine: T,
-    /// κ = u·δ/|u×δ| of a U joint: how much the leg spins as it swings; zero for other joints.
-    pub slope: T,
-}
-
-impl<T: Real> Frame<T> {
-    #[inline(always)]
-    pub fn n(&self) -> Vec3<T> {
-        self.axes.0[0]
     }
 }
 
@@ -182,20 +102,6 @@ pub fn frame<T: Real>(leg: &Leg<impl Constant<T>>, pose: &Pose<T>, p: &Position<
 }
 
 /// How the platform end moves, and with it the leg's coordinate and direction \[T2\]-\[T4\] \[T68\].
-#[derive(Clone, Copy, Debug)]
-pub struct End<T> {
-    /// Base axes.
-    pub v_b: Vec3<T>,
-    pub a_b: Vec3<T>,
-    /// Of the coordinate: ℓ' and ℓ'', or q' and q''.
-    pub rate: T,
-    pub acceleration: T,
-    /// δ' along n and m.
-    pub delta_rate: [T; 2],
-    /// δ'' along n and m; along δ it is -|δ'|².
-    pub delta_acceleration: [T; 2],
-}
-
 #[inline(always)]
 pub fn end<T: Real>(
     leg: &Leg<impl Constant<T>>,
@@ -204,45 +110,12 @@ pub fn end<T: Real>(
     platform: &Motion<T>,
 ) -> End<T> {
     let Motion { twist, acceleration, .. } = platform;
-    let (omega, e, inverse) = (twist.omega, p.e, T::one() / p.length);
+    let (omega, e) = (twist.omega, p.e);
     // [Eq. 20] [T2] v_b = v + ω×e;  [Eq. 34] a_b = a + ε×e + ω×(ω×e)
     let spin_e = omega.cross(e);
     let v_b = twist.v + spin_e;
     let a_b = acceleration.a + acceleration.eps.cross(e) + omega.cross(spin_e);
-    let (v, a) = (f.axes.transpose_mul(v_b), f.axes.transpose_mul(a_b));
-    match leg.drive {
-        Drive::Telescope => {
-            // In the leg's axes: [Eq. 6] [T3] ℓ' = δ·v_b;  δ' = (v_b - ℓ'δ)/ℓ
-            let rate = [v.x * inverse, v.z * inverse];
-            // [Eq. 15] [T4] ℓ'' = δ·a_b + v_b·δ';  δ'' = (a_b - ℓ''δ - 2ℓ'δ')/ℓ
-            let second = v.x.mul_add(rate[0], v.z.mul_add(rate[1], a.y));
-            let twice = v.y + v.y;
-            let delta_acceleration = [(a.x - twice * rate[0]) * inverse, (a.z - twice * rate[1]) * inverse];
-            End { v_b, a_b, rate: v.y, acceleration: second, delta_rate: rate, delta_acceleration }
-        }
-        Drive::Slider { rail, .. } => {
-            // [T68] q' = δ·v_b/(δ·a);  δ' = (v_b - q'a)/c
-            let d = f.axes.transpose_mul(Vec3::lift(rail));
-            let share = T::one() / d.y;
-            let q = v.y * share;
-            let rate = [(v.x - q * d.x) * inverse, (v.z - q * d.z) * inverse];
-            // [T68] q'' = (δ·a_b + c |δ'|²)/(δ·a);  δ'' = (a_b - q''a)/c
-            let square = rate[0].mul_add(rate[0], rate[1] * rate[1]);
-            let second = p.length.mul_add(square, a.y) * share;
-            let delta_acceleration = [(a.x - second * d.x) * inverse, (a.z - second * d.z) * inverse];
-            End { v_b, a_b, rate: q, acceleration: second, delta_rate: rate, delta_acceleration }
-        }
-    }
-}
-
-/// How the leg turns \[T6\].
-#[derive(Clone, Copy, Debug)]
-pub struct Turn<T> {
-    pub spin: T,
-    pub spin_rate: T,
-    /// Angular velocity and acceleration along n, δ, m.
-    pub omega: Vec3<T>,
-    pub eps: Vec3<T>,
+    leg.drive.end(p, f, v_b, a_b)
 }
 
 /// The leg's angular velocity and acceleration: with u = L [Eq. 22-28], with u = -e/|e| on the platform [Eq. 29-35].
@@ -289,29 +162,6 @@ fn spin<T: Real>(turning: Turning<impl Constant<T>>, slope: T, a: T, b: T, a1: T
     }
 }
 
-/// All of a leg at an instant.
-#[derive(Clone, Copy, Debug)]
-pub struct State<T> {
-    pub position: Position<T>,
-    pub end: End<T>,
-    pub frame: Frame<T>,
-    pub turn: Turn<T>,
-}
-
-impl<T: Real> State<T> {
-    /// Angular velocity, base axes.
-    #[inline(always)]
-    pub fn omega(&self) -> Vec3<T> {
-        self.frame.axes * self.turn.omega
-    }
-
-    /// Angular acceleration, base axes.
-    #[inline(always)]
-    pub fn eps(&self) -> Vec3<T> {
-        self.frame.axes * self.turn.eps
-    }
-}
-
 /// Where a leg is at a pose, however that moves.
 pub type Place<T> = (Position<T>, Frame<T>);
 
@@ -352,14 +202,7 @@ pub fn carry<T: Real>(
     // M·ω = (M×δ)·δ' + (M·δ) s, and δ' = (v_b - ℓ'δ)/ℓ
     let along_n = f.slope.mul_add(torque.y, -torque.z).mul_add(inverse, force.x);
     let along_m = torque.x.mul_add(inverse, force.z);
-    let along_delta = match leg.drive {
-        Drive::Telescope => force.y,
-        Drive::Slider { rail, .. } => {
-            // δ' = (v_b - (δ·v_b) a/(δ·a))/c: what turns the strut along the rail is felt along δ.
-            let d = f.axes.transpose_mul(Vec3::lift(rail));
-            force.y - ((along_n - force.x) * d.x + (along_m - force.z) * d.z) / d.y
-        }
-    };
+    let along_delta = leg.drive.carried_along(f, force, [along_n, along_m]);
     let wrench = Wrench::at(p.e, f.axes * Vec3::new(along_n, along_delta, along_m));
     match leg.turning {
         // s = κ n·(δ' - ω×δ) + ω·δ
@@ -370,47 +213,16 @@ pub fn carry<T: Real>(
     }
 }
 
-/// A point fixed in a link that turns with the leg: offset from the link's reference point, velocity, acceleration.
-#[derive(Clone, Copy, Debug)]
-pub struct PointMotion<T> {
-    pub offset: Vec3<T>,
-    pub velocity: Vec3<T>,
-    pub acceleration: Vec3<T>,
-}
-
-#[inline(always)]
-fn point_motion<T: Real>(
-    state: &State<T>,
-    center: Vec3<f64>,
-    velocity: Vec3<T>,
-    acceleration: Vec3<T>,
-) -> PointMotion<T> {
-    let (axes, Turn { omega, eps, .. }, center) = (state.frame.axes, state.turn, Vec3::lift(center));
-    let spin = omega.cross(center);
-    PointMotion {
-        offset: axes * center,
-        velocity: velocity + axes * spin,
-        acceleration: acceleration + axes * (eps.cross(center) + omega.cross(spin)),
-    }
-}
-
 /// The piston's mass centre, offset from b [Eq. 38, 39] \[T8\].
 #[inline(always)]
 pub fn piston<T: Real>(leg: &Leg<impl Constant<T>>, state: &State<T>) -> PointMotion<T> {
-    point_motion(state, leg.piston.center, state.end.v_b, state.end.a_b)
+    state.point_motion(leg.piston.center, state.end.v_b, state.end.a_b)
 }
 
 /// The cylinder's mass centre, offset from B [Eq. 38, 39] \[T8\]; that of a carriage from the strut's foot.
 #[inline(always)]
 pub fn cylinder<T: Real>(leg: &Leg<impl Constant<T>>, state: &State<T>) -> PointMotion<T> {
-    match leg.drive {
-        Drive::Telescope => point_motion(state, leg.cylinder.center, Vec3::zero(), Vec3::zero()),
-        Drive::Slider { rail, .. } => {
-            let (a, End { rate, acceleration, .. }) = (Vec3::<T>::lift(rail), state.end);
-            let offset = Vec3::lift(leg.cylinder.center);
-            PointMotion { offset, velocity: a * rate, acceleration: a * acceleration }
-        }
-    }
+    leg.drive.first_link(leg.cylinder.center, state)
 }
 
 /// How a rod turns about its own line, from the leg that leads it \[T7\].

@@ -1,9 +1,11 @@
 pub mod chart;
 pub mod constraint;
 pub mod coordinate_sets;
+pub mod drive;
 pub mod idle;
 pub mod jacobian;
 pub mod leg;
+pub mod leg_state;
 pub mod passive_joints;
 pub mod quadratic_forms;
 pub mod redundant_rows;

@@ -4,10 +4,10 @@
 //! that `ω = ω_leg + φ_1' u + φ_2' n` [Eq. 29].
 
 use crate::kinematics::leg::{self, State};
+use crate::model::joint::Joint;
 use crate::model::limit::Zero;
-use crate::model::mechanism::{Joint, Leg, Mechanism};
+use crate::model::mechanism::{Leg, Mechanism};
 use crate::model::spec::Axes;
-use crate::model::spec::JointKind;
 use crate::number::real::{Real, Trig};
 use crate::spatial::{Mat3, Motion, Pose, Vec3};
 
@@ -74,9 +74,9 @@ pub fn angles_at<T: Trig>(
         }
     };
     let none = T::lit(f64::NAN);
-    let angles = match (joint.kind, joint.axis) {
-        (JointKind::Universal, Some(u)) => [about(u, n0, n), swing(u, (delta0, n0), delta, n)],
-        (JointKind::Revolute, Some(u)) => [about(u, delta0, delta), none],
+    let angles = match (joint.kind.angles(), joint.axis) {
+        (2, Some(u)) => [about(u, n0, n), swing(u, (delta0, n0), delta, n)],
+        (1, Some(u)) => [about(u, delta0, delta), none],
         _ => [none, none],
     };
     match side {
@@ -91,9 +91,9 @@ pub fn angles_at<T: Trig>(
 #[inline(always)]
 fn rates<T: Real>(joint: &Joint, body: &Mat3<T>, n: Vec3<T>, omega: Vec3<T>) -> [T; 2] {
     let none = T::lit(f64::NAN);
-    match (joint.kind, joint.axis) {
-        (JointKind::Universal, Some(u)) => [omega.dot(body.of(u)), omega.dot(n)],
-        (JointKind::Revolute, Some(u)) => [omega.dot(body.of(u)), none],
+    match (joint.kind.angles(), joint.axis) {
+        (2, Some(u)) => [omega.dot(body.of(u)), omega.dot(n)],
+        (1, Some(u)) => [omega.dot(body.of(u)), none],
         _ => [none; 2],
     }
 }

@@ -9,7 +9,7 @@ use crate::kinematics::leg::{self, Position};
 use crate::kinematics::passive_joints;
 use crate::mobility::singularity;
 use crate::model::limit::{Bound, Limit, Measure, Strut, Zero};
-use crate::model::mechanism::{Drive, Leg, Mechanism};
+use crate::model::mechanism::{Leg, Mechanism};
 use crate::model::spec::Axes;
 use crate::model::spec::{JointSpec, LegSpec, LimitsSpec, RodSpec, Spec};
 use crate::model::status::Status;
@@ -65,12 +65,13 @@ impl Limit {
     }
 
     #[must_use]
-    pub fn unit(&self) -> &'static str {
+    pub fn unit(&self, mech: &Mechanism) -> &'static str {
         match self.measure {
-            Measure::Length(_) | Measure::Struts(_) | Measure::Plate(..) => "m",
+            Measure::Length(leg) => mech.legs[leg].drive.kind().coordinate_unit,
+            Measure::Struts(_) | Measure::Plate(..) => "m",
             Measure::Cone(..) | Measure::Angle(..) | Measure::RodAngle(..) => "rad",
             Measure::Conditioning => "1",
-            Measure::Force { .. } => "N",
+            Measure::Force { leg, .. } => mech.legs[leg].drive.kind().force_unit,
         }
     }
 
@@ -237,9 +238,10 @@ impl Strut {
     #[inline(always)]
     fn foot<T: Real>(&self, mech: &Mechanism, pose: &Pose<T>) -> Vec3<T> {
         let leg = &mech.legs[self.leg];
-        match leg.drive {
-            Drive::Telescope => Vec3::lift(leg.base.point),
-            Drive::Slider { .. } => leg::foot(leg, &leg::position(leg, pose)),
+        if leg.drive.moves_foot() {
+            leg::foot(leg, &leg::position(leg, pose))
+        } else {
+            Vec3::lift(leg.base.point)
         }
     }
 

@@ -7,15 +7,15 @@
 use crate::kinematics::constraint;
 use crate::kinematics::idle;
 use crate::kinematics::leg;
+use crate::model::joint::{Joint, JointKind, Normal};
 use crate::model::mechanism::{
-    Constraint, ConstraintRow, Drive, Graph, GraphJoint, GraphLink, Leg, Mechanism, Mobility, Turning,
+    Constraint, ConstraintRow, Graph, GraphJoint, GraphLink, Leg, Mechanism, Mobility, Turning,
 };
 use crate::model::mechanism::{Idle, IdleRow};
 use crate::model::spec::Axes;
-use crate::model::spec::JointKind;
 use crate::numerics::random::Draw;
 use crate::numerics::svd::Svd;
-use crate::spatial::{Mat3, Pose, Vec3, Wrench};
+use crate::spatial::{Mat3, Pose, Twist, Vec3, Wrench};
 use nalgebra::{DMatrix, DVector};
 
 /// Singular values below this share of the largest count as zero.
@@ -77,12 +77,9 @@ pub fn analyse(mech: &Mechanism) -> (Vec<Constraint>, Vec<Idle>, Mobility) {
     (independent, idle, mobility)
 }
 
-fn joint_freedoms(kind: &str) -> usize {
-    match kind {
-        "S" => 3,
-        "U" => 2,
-        _ => 1,
-    }
+/// Of a joint of the graph: the joint of a drive has one.
+fn joint_freedoms(letter: &str) -> usize {
+    JointKind::ALL.into_iter().find(|kind| kind.letter() == letter).map_or(1, JointKind::freedoms)
 }
 
 /// Poses near home that the mechanism can have, the same ones every time.
@@ -269,25 +266,16 @@ fn leg_screws(leg: &Leg, pose: &Pose<f64>) -> Vec<Screw> {
     let p = leg::position(leg, pose);
     let n = leg::frame(leg, pose, &p).n();
     let below = leg::foot(leg, &p) - pose.o;
-    let slide = match leg.drive {
-        Drive::Telescope => p.delta,
-        Drive::Slider { rail, .. } => rail,
-    };
+    let Twist { v: linear, omega: angular } = leg.drive.twist(&p);
     let (base, platform) = (leg.base.axis.unwrap_or(n), leg.platform.axis.map_or(n, |a| pose.rotation * a));
-    let turns = |kind: JointKind, axis: Vec3<f64>| match kind {
-        JointKind::Spherical => vec![Vec3::X, Vec3::Y, Vec3::Z],
-        JointKind::Universal => vec![axis, n],
-        JointKind::Revolute => vec![axis],
-        JointKind::Fixed => vec![],
-    };
-    let mut base_turns = turns(leg.base.kind, base);
+    let mut base_turns = leg.base.kind.turns(base, n);
     if leg.rod.is_some() {
         // The rod's own turning is shared with its other legs; what is left is R about n.
         base_turns.remove(0);
     }
     let mut screws: Vec<Screw> = base_turns.into_iter().map(|a| Screw::turn(a, below)).collect();
-    screws.push(Screw { linear: slide * p.length, angular: Vec3::zero() });
-    screws.extend(turns(leg.platform.kind, platform).into_iter().map(|a| Screw::turn(a, p.e)));
+    screws.push(Screw { linear, angular });
+    screws.extend(leg.platform.kind.turns(platform, n).into_iter().map(|a| Screw::turn(a, p.e)));
     screws
 }
 
@@ -302,34 +290,27 @@ fn graph(mech: &Mechanism) -> Graph {
         names.push(format!("rod {}", rod.name));
     }
     for leg in &mech.legs {
-        let mut link = |kind: JointKind, body: usize, name: &str| {
-            if kind == JointKind::Fixed {
+        let mut link = |joint: &Joint, body: usize, name: &str| {
+            // A joint F makes one link of two; what a drive below it moves is a link whatever the joint on it.
+            if joint.kind.is_fixed() && !leg.drive.moves_foot() {
                 return body;
             }
             names.push(format!("{name} {}", leg.name));
             names.len() - 1
         };
         let ground = leg.rod.map_or(0, |rod| rods[rod]);
-        // A joint F makes one link of two; a carriage is a link whatever the joint on it.
-        let kinds = match leg.drive {
-            Drive::Telescope => [leg.base.kind, leg.platform.kind],
-            Drive::Slider { .. } => [leg.base.kind, leg.platform.kind].map(|_| JointKind::Revolute),
-        };
         let [first, second] = leg.links();
-        let (first, second) = (link(kinds[0], 0, first), link(kinds[1], 1, second));
-        let below = if leg.rod.is_some() { JointKind::Revolute } else { leg.base.kind };
+        let (first, second) = (link(&leg.base, 0, first), link(&leg.platform, 1, second));
+        let below = leg.base_kind();
         let mut join = |kind: &'static str, place: &str, links| {
             joints.push(GraphJoint { kind, name: format!("{place} {}", leg.name), links });
         };
-        let (base_joint, prismatic) = match leg.drive {
-            Drive::Telescope => ([ground, first], [first, second]),
-            Drive::Slider { .. } => ([first, second], [0, first]),
-        };
-        if below != JointKind::Fixed {
+        let [base_joint, prismatic] = leg.drive.between([ground, first, second]);
+        if !below.is_fixed() {
             join(below.letter(), "base joint", base_joint);
         }
-        join("P", "prismatic", prismatic);
-        if leg.platform.kind != JointKind::Fixed {
+        join(leg.drive.kind().letter, "prismatic", prismatic);
+        if !leg.platform.kind.is_fixed() {
             join(leg.platform.kind.letter(), "platform joint", [second, 1]);
         }
     }
@@ -348,8 +329,8 @@ pub fn coupled_pair(mech: &Mechanism) -> Option<([usize; 2], Vec3<f64>, Vec3<f64
         let &[first, second] = on.as_slice() else {
             return None;
         };
-        let axis = |i: usize| match (mech.legs[i].turning, mech.legs[i].platform.kind) {
-            (Turning::Across(Axes::Base, _), JointKind::Universal) => mech.legs[i].platform.axis,
+        let axis = |i: usize| match (mech.legs[i].turning, mech.legs[i].platform.normal()) {
+            (Turning::Across(Axes::Base, _), Some(Normal::Across(axis))) => Some(axis),
             _ => None,
         };
         let (a, b) = (axis(first)?, axis(second)?);

@@ -6,8 +6,10 @@
 
 use serde::Serialize;
 
+use crate::model::drive::Drive;
+use crate::model::joint::{Joint, JointKind};
 use crate::model::limit::Limit;
-use crate::model::spec::{Axes, JointKind};
+use crate::model::spec::Axes;
 use crate::spatial::{Mat3, Pose, Vec3, Wrench};
 
 /// Mass, mass centre and inertia about it, in the axes of the link.
@@ -16,6 +18,14 @@ pub struct Body {
     pub mass: f64,
     pub center: Vec3<f64>,
     pub inertia: Mat3<f64>,
+}
+
+impl Body {
+    /// Of a link that is not described.
+    pub const NONE: Self = {
+        let zero = Vec3 { x: 0.0, y: 0.0, z: 0.0 };
+        Body { mass: 0.0, center: zero, inertia: Mat3([zero; 3]) }
+    };
 }
 
 /// What gives the leg's frame (n, δ, n×δ) its direction n, and so its spin about δ \[T5\].
@@ -35,43 +45,6 @@ impl<S> Turning<S> {
         match self {
             Turning::Across(_, u) | Turning::Along(_, u) | Turning::Free(u) => u,
         }
-    }
-}
-
-/// What a leg's prismatic joint moves \[T67\].
-#[derive(Clone, Copy, Debug)]
-pub enum Drive<S = f64> {
-    /// The strut's far end, along the strut: the joint's coordinate is the length ℓ.
-    Telescope,
-    /// The strut's foot, along a rail fixed in the base: the coordinate is its place q from B. The strut is rigid.
-    Slider {
-        /// Unit vector a, base axes.
-        rail: Vec3<S>,
-        /// c, m.
-        strut: S,
-        /// The sign of δ·a: one of the two places from which a strut reaches b.
-        branch: f64,
-    },
-}
-
-#[derive(Clone, Debug)]
-pub struct Joint<S = f64> {
-    pub kind: JointKind,
-    /// In the axes of its body, m.
-    pub point: Vec3<S>,
-    /// Unit axis in the axes of its body: U, the axis fixed to that body; R, its axis; F, the leg's direction.
-    pub axis: Option<Vec3<S>>,
-    /// F: the leg's n.
-    pub normal: Option<Vec3<S>>,
-    /// Unit axis from which the cone angle is measured, in the axes of the body.
-    pub cone_axis: Vec3<f64>,
-}
-
-impl<S: Copy> Joint<S> {
-    /// F: the leg's direction, from B to b.
-    #[must_use]
-    pub fn direction(&self) -> Option<Vec3<S>> {
-        if self.kind == JointKind::Fixed { self.axis } else { None }
     }
 }
 
@@ -113,24 +86,25 @@ pub struct Leg<S = f64> {
 }
 
 impl<S> Leg<S> {
+    /// The kind of its base joint itself, which on a rod is R.
+    #[must_use]
+    pub fn base_kind(&self) -> JointKind {
+        if self.rod.is_some() { JointKind::ON_ROD } else { self.base.kind }
+    }
+
     /// Letters of its joints from base to platform, `RPU` for one on a rod, `PUS` for a slider.
     #[must_use]
     pub fn letters(&self) -> String {
-        let base = if self.rod.is_some() { "R" } else { self.base.kind.letter() };
-        let platform = self.platform.kind.letter();
-        match self.drive {
-            Drive::Telescope => format!("{base}P{platform}"),
-            Drive::Slider { .. } => format!("P{base}{platform}"),
-        }
+        let [base, drive] = self.drive.between([0, 1, 2]).map(|[from, _]| from);
+        let mut letters = [self.platform.kind.letter(); 3];
+        (letters[base], letters[drive]) = (self.base_kind().letter(), self.drive.kind().letter);
+        letters.concat()
     }
 
     /// Words for its two links, from the base on.
     #[must_use]
     pub fn links(&self) -> [&'static str; 2] {
-        match self.drive {
-            Drive::Telescope => ["cylinder", "piston"],
-            Drive::Slider { .. } => ["carriage", "strut"],
-        }
+        self.drive.kind().links
     }
 }
 

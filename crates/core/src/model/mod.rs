@@ -1,3 +1,5 @@
+pub mod drive;
+pub mod joint;
 pub mod limit;
 pub mod mechanism;
 pub mod spec;

@@ -7,6 +7,8 @@ use std::ops::RangeInclusive;
 
 use serde::Deserialize;
 
+use crate::model::drive::{self, DriveKind};
+use crate::model::joint::JointKind;
 use crate::spatial::{Mat3, Vec3};
 
 /// What is wrong, and where: `legs.3.stroke` counts from 1, as the file does.
@@ -19,40 +21,6 @@ pub struct Fault {
 impl Fault {
     pub fn new(place: impl Into<String>, message: impl Into<String>) -> Self {
         Fault { place: place.into(), message: message.into() }
-    }
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
-pub enum JointKind {
-    #[serde(rename = "S")]
-    Spherical,
-    #[serde(rename = "U")]
-    Universal,
-    #[serde(rename = "R")]
-    Revolute,
-    #[serde(rename = "F")]
-    Fixed,
-}
-
-impl JointKind {
-    #[must_use]
-    pub fn freedoms(self) -> usize {
-        match self {
-            JointKind::Spherical => 3,
-            JointKind::Universal => 2,
-            JointKind::Revolute => 1,
-            JointKind::Fixed => 0,
-        }
-    }
-
-    #[must_use]
-    pub fn letter(self) -> &'static str {
-        match self {
-            JointKind::Spherical => "S",
-            JointKind::Universal => "U",
-            JointKind::Revolute => "R",
-            JointKind::Fixed => "F",
-        }
     }
 }
 
@@ -128,12 +96,19 @@ pub struct LegSpec {
 }
 
 impl LegSpec {
+    /// What it is driven by.
+    fn drive(&self) -> &'static DriveKind {
+        match self.slider {
+            None => &drive::TELESCOPE,
+            Some(_) => &drive::SLIDER,
+        }
+    }
+
     /// The bodies that turn with the leg, and their keys in the file.
     fn turning_bodies(&self) -> Vec<(&'static str, Option<&BodySpec>)> {
-        match self.slider {
-            None => vec![("cylinder", self.cylinder.as_ref()), ("piston", self.piston.as_ref())],
-            Some(_) => vec![("strut", self.piston.as_ref())],
-        }
+        let DriveKind { links: [first, second], own_numbers, .. } = self.drive();
+        let turns = own_numbers.is_none().then_some((*first, self.cylinder.as_ref()));
+        turns.into_iter().chain([(*second, self.piston.as_ref())]).collect()
     }
 }
 
@@ -321,7 +296,7 @@ impl Faults {
                 let message = format!("is {} rad; must be above 0 and at most pi", cone.angle);
                 self.add(format!("{place}.{side}.cone.angle"), message);
             }
-            if joint.range.is_some() && joint.joint != JointKind::Revolute {
+            if joint.range.is_some() && !joint.joint.has_range() {
                 let message = format!(
                     "must not be given; only R joints have a range, this is {}",
                     joint.joint.letter()
@@ -332,12 +307,10 @@ impl Faults {
         }
         if let Some([min, max]) = leg.stroke {
             // A carriage may be on either side of its rail's point; a length is none below zero.
-            let (least, need) = match leg.slider {
-                None => (0.0, "0 <= min < max"),
-                Some(_) => (f64::MIN, "min < max"),
-            };
+            let DriveKind { least, coordinate_unit: unit, .. } = *leg.drive();
+            let need = if least == 0.0 { "0 <= min < max" } else { "min < max" };
             if !(min >= least && min < max && max.is_finite()) {
-                let message = format!("min is {min} m, max is {max} m; needs {need}");
+                let message = format!("min is {min} {unit}, max is {max} {unit}; needs {need}");
                 self.add(format!("{place}.stroke"), message);
             }
         }
@@ -352,7 +325,9 @@ impl Faults {
         if let Some([min, max]) = leg.force
             && !(min < max && min.is_finite() && max.is_finite())
         {
-            self.add(format!("{place}.force"), format!("min is {min} N, max is {max} N; needs min < max"));
+            let unit = leg.drive().force_unit;
+            let message = format!("min is {min} {unit}, max is {max} {unit}; needs min < max");
+            self.add(format!("{place}.force"), message);
         }
         if leg.force.is_some() && !leg.actuated {
             self.add(format!("{place}.force"), "must not be given; a passive leg has no active force");
@@ -360,7 +335,7 @@ impl Faults {
         for (part, body) in leg.turning_bodies() {
             self.body(&format!("{place}.{part}"), body);
         }
-        if leg.base.joint == JointKind::Spherical && leg.platform.joint == JointKind::Spherical {
+        if leg.base.joint.normal().is_none() && leg.platform.joint.normal().is_none() {
             for (part, body) in leg.turning_bodies() {
                 if body.is_some_and(|b| !symmetric_about_leg(b)) {
                     self.add(
@@ -449,11 +424,8 @@ impl Faults {
                 self.axis(&format!("{place}.{key}"), axis);
             }
         }
-        let (axis, normal) = match (joint.joint, joint.rod) {
-            (JointKind::Spherical, _) | (JointKind::Revolute, Some(_)) => (false, false),
-            (JointKind::Universal, _) | (JointKind::Revolute, None) => (true, false),
-            (JointKind::Fixed, _) => (true, true),
-        };
+        let on_rod = joint.rod.is_some() && joint.joint == JointKind::ON_ROD;
+        let (axis, normal) = (joint.joint.has_axis() && !on_rod, joint.joint.has_normal());
         for (key, needed, given) in
             [("axis", axis, joint.axis.is_some()), ("normal", normal, joint.normal.is_some())]
         {
@@ -465,7 +437,7 @@ impl Faults {
             }
         }
         if let Some(rod) = joint.rod {
-            if joint.joint != JointKind::Revolute {
+            if joint.joint != JointKind::ON_ROD {
                 self.add(
                     format!("{place}.joint"),
                     format!("is {}; on a rod it must be R", joint.joint.letter()),
@@ -475,7 +447,7 @@ impl Faults {
                 self.add(format!("{place}.rod"), "names no rod of this mechanism");
             }
         }
-        if let (JointKind::Fixed, Some(axis), Some(normal)) = (joint.joint, joint.axis, joint.normal)
+        if let (true, Some(axis), Some(normal)) = (joint.joint.has_normal(), joint.axis, joint.normal)
             && axis.dot(normal).abs() > ANGLE_TOLERANCE * axis.norm() * normal.norm()
         {
             self.add(format!("{place}.normal"), "must be square to the axis");

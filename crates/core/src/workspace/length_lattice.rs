@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use crate::forward_kinematics::newton::forward_kinematics;
 use crate::kinematics::leg;
 use crate::model::limit::{Bound, Measure};
-use crate::model::mechanism::{Drive, Mechanism};
+use crate::model::mechanism::Mechanism;
 use crate::model::status::Status;
 use crate::number::lanes::WIDTH;
 use crate::spatial::{Pose, Vec3};
@@ -240,7 +240,9 @@ impl Lattice {
         let axes: Option<Vec<Axis>> = mech
             .actuated()
             .map(|(i, leg)| {
-                let Drive::Telescope = leg.drive else { return None };
+                if leg.drive.moves_foot() {
+                    return None;
+                }
                 let end = |least: bool| {
                     mech.limits.iter().find_map(|l| match (&l.measure, l.bound) {
                         (Measure::Length(k), Bound::Least(x)) if *k == i && least => Some(x),
