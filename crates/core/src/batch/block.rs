@@ -225,7 +225,7 @@ pub(super) fn table<const N: usize>(
     fields: [(&'static str, Vec<usize>); N],
 ) -> Table {
     filled(states, fields, Pieces { least: GRAIN, unit: WIDTH }, &|part| {
-        lanes::dispatch(Blocks { operation, part });
+        lanes::dispatch((operation, part));
     })
 }
 
@@ -386,16 +386,12 @@ impl<const N: usize> Part<'_, N> {
     }
 }
 
-/// Some of the states in blocks.
-struct Blocks<'a, O, const N: usize> {
-    operation: &'a O,
-    part: Part<'a, N>,
-}
-
-impl<O: Working<N>, const N: usize> Task for Blocks<'_, O, N> {
+/// An operation at some of the states, in blocks. A pair with the operation first, so that it is compiled with that (see
+/// [`Task`]).
+impl<O: Working<N>, const N: usize> Task for (&O, Part<'_, N>) {
     #[inline(always)]
     fn run<V: Lanes>(self) {
-        let Blocks { operation, part } = self;
+        let (operation, part) = self;
         let mut count = 0;
         let starts = part.widths.map(|width| {
             count += width;

@@ -92,17 +92,74 @@ impl Lanes for f64 {
 }
 
 /// What is to be done with registers of any width.
-pub trait Task {
+///
+/// The functions for one instruction set are methods of the task, because the compiler puts a method into the codegen unit of
+/// the type that has it: so the tasks of different modules, which are most of what there is to compile, compile side by side.
+pub trait Task: Sized {
     /// Must be `#[inline(always)]` with all that it calls, so that it is compiled for each instruction set.
     fn run<V: Lanes>(self);
+
+    /// # Safety
+    /// The processor must have AVX2 and FMA.
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2,fma")]
+    unsafe fn run_avx2(self) {
+        self.run::<x86::F64x4>();
+    }
+
+    /// # Safety
+    /// The processor must have AVX-512 (F and DQ) and FMA.
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx512f,avx512dq,fma")]
+    unsafe fn run_avx512(self) {
+        self.run::<x86::F64x8>();
+    }
+
+    /// With the registers that every processor of its kind has.
+    #[inline(never)]
+    fn run_baseline(self) {
+        #[cfg(target_arch = "x86_64")]
+        self.run::<x86::F64x2>();
+        #[cfg(target_arch = "aarch64")]
+        self.run::<arm::F64x2>();
+        #[cfg(not(any(target_arch = "x86_64", target_arch = "aarch64")))]
+        self.run::<f64>();
+    }
 }
 
-/// What is to be done with registers of one kind.
-pub trait Work<V> {
+/// What is to be done with registers of one kind; its functions of their own are methods for the reason of [`Task`]'s.
+pub trait Work<V>: Sized {
     type Result;
 
     /// Must be `#[inline(always)]` with all that it calls.
     fn run(self) -> Self::Result;
+
+    /// # Safety
+    /// The processor must have AVX2 and FMA.
+    #[cfg(target_arch = "x86_64")]
+    #[inline(never)]
+    #[target_feature(enable = "avx2,fma")]
+    unsafe fn apart_avx2(self) -> Self::Result {
+        self.run()
+    }
+
+    /// # Safety
+    /// The processor must have AVX-512 (F and DQ) and FMA.
+    #[cfg(target_arch = "x86_64")]
+    #[inline(never)]
+    #[target_feature(enable = "avx512f,avx512dq,fma")]
+    unsafe fn apart_avx512(self) -> Self::Result {
+        self.run()
+    }
+
+    /// With the instructions that every processor of its kind has.
+    ///
+    /// # Safety
+    /// None is needed.
+    #[inline(never)]
+    unsafe fn apart_baseline(self) -> Self::Result {
+        self.run()
+    }
 }
 
 /// Instruction sets of this kind of processor with the width of their registers, the narrowest first.
@@ -140,16 +197,14 @@ pub fn use_instructions(name: &str) -> bool {
 pub fn dispatch(task: impl Task) {
     #[cfg(target_arch = "x86_64")]
     x86::dispatch(task);
-    #[cfg(target_arch = "aarch64")]
-    task.run::<arm::F64x2>();
-    #[cfg(not(any(target_arch = "x86_64", target_arch = "aarch64")))]
-    task.run::<f64>();
+    #[cfg(not(target_arch = "x86_64"))]
+    task.run_baseline();
 }
 
 /// The operations of a register by the instructions that make them.
 macro_rules! register {
     (
-        $(#[$doc:meta])* $name:ident($vector:ty), $width:literal, $mask:ty, $features:literal, fused $fused:literal;
+        $(#[$doc:meta])* $name:ident($vector:ty), $width:literal, $mask:ty, $features:literal, fused $fused:literal, apart $apart:ident;
         $add:ident $sub:ident $mul:ident $div:ident $sqrt:ident $splat:ident $load:ident $store:ident;
         neg |$n:ident| $neg:expr;
         mul_add |$m:ident, $by:ident, $plus:ident| $mul_add:expr;
@@ -292,12 +347,7 @@ macro_rules! register {
             }
             #[inline(always)]
             fn apart<W: $crate::number::lanes::Work<Self>>(work: W) -> W::Result {
-                #[inline(never)]
-                #[target_feature(enable = $features)]
-                fn called<W: $crate::number::lanes::Work<$name>>(work: W) -> W::Result {
-                    work.run()
-                }
-                unsafe { called(work) }
+                unsafe { work.$apart() }
             }
             $($own)*
         }
@@ -317,7 +367,7 @@ mod x86 {
 
     register! {
         /// SSE2, which every x86-64 has.
-        F64x2(__m128d), 2, __m128d, "sse2", fused false;
+        F64x2(__m128d), 2, __m128d, "sse2", fused false, apart apart_baseline;
         _mm_add_pd _mm_sub_pd _mm_mul_pd _mm_div_pd _mm_sqrt_pd _mm_set1_pd _mm_loadu_pd _mm_storeu_pd;
         neg |a| _mm_xor_pd(a, _mm_set1_pd(-0.0));
         mul_add |a, b, c| _mm_add_pd(_mm_mul_pd(a, b), c);
@@ -330,7 +380,7 @@ mod x86 {
 
     register! {
         /// AVX2.
-        F64x4(__m256d), 4, __m256d, "avx2,fma", fused true;
+        F64x4(__m256d), 4, __m256d, "avx2,fma", fused true, apart apart_avx2;
         _mm256_add_pd _mm256_sub_pd _mm256_mul_pd _mm256_div_pd _mm256_sqrt_pd _mm256_set1_pd _mm256_loadu_pd _mm256_storeu_pd;
         neg |a| _mm256_xor_pd(a, _mm256_set1_pd(-0.0));
         mul_add |a, b, c| _mm256_fmadd_pd(a, b, c);
@@ -343,7 +393,7 @@ mod x86 {
 
     register! {
         /// AVX-512.
-        F64x8(__m512d), 8, __mmask8, "avx512f,avx512dq,fma", fused true;
+        F64x8(__m512d), 8, __mmask8, "avx512f,avx512dq,fma", fused true, apart apart_avx512;
         _mm512_add_pd _mm512_sub_pd _mm512_mul_pd _mm512_div_pd _mm512_sqrt_pd _mm512_set1_pd _mm512_loadu_pd _mm512_storeu_pd;
         neg |a| _mm512_xor_pd(a, _mm512_set1_pd(-0.0));
         mul_add |a, b, c| _mm512_fmadd_pd(a, b, c);
@@ -443,9 +493,9 @@ mod x86 {
     pub fn dispatch(task: impl Task) {
         // SAFETY: of both: the processor has the instructions.
         match widest().min(WIDEST.load(Ordering::Relaxed)) {
-            8.. => unsafe { avx512(task) },
-            4..8 => unsafe { avx2(task) },
-            _ => task.run::<F64x2>(),
+            8.. => unsafe { task.run_avx512() },
+            4..8 => unsafe { task.run_avx2() },
+            _ => task.run_baseline(),
         }
     }
 
@@ -468,19 +518,9 @@ mod x86 {
         pub fn on_each_width(task: impl Task + Copy) {
             task.run::<F64x2>();
             if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
-                unsafe { avx2(task) }
+                unsafe { task.run_avx2() }
             }
         }
-    }
-
-    #[target_feature(enable = "avx512f,avx512dq,fma")]
-    fn avx512(task: impl Task) {
-        task.run::<F64x8>();
-    }
-
-    #[target_feature(enable = "avx2,fma")]
-    fn avx2(task: impl Task) {
-        task.run::<F64x4>();
     }
 }
 
@@ -495,7 +535,7 @@ mod arm {
 
     register! {
         /// NEON, which every aarch64 has.
-        F64x2(float64x2_t), 2, uint64x2_t, "neon", fused true;
+        F64x2(float64x2_t), 2, uint64x2_t, "neon", fused true, apart apart_baseline;
         vaddq_f64 vsubq_f64 vmulq_f64 vdivq_f64 vsqrtq_f64 vdupq_n_f64 vld1q_f64 vst1q_f64;
         neg |a| vnegq_f64(a);
         mul_add |a, b, c| vfmaq_f64(c, a, b);
