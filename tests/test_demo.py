@@ -98,9 +98,9 @@ def test_the_motion_is_compared_with_another_engine(demo):
 
 def test_without_the_engine_the_summary_says_what_to_install(monkeypatch):
     from polypod.paper.tables import table_iii_markdown
-    from polypod.verify import table
+    from polypod.verify import engines
 
-    monkeypatch.setattr(table, "find_spec", lambda module: None)
+    monkeypatch.setattr(engines, "find_spec", lambda module: None)
     mech = pp.load(EXAMPLE)
     assert "pip install polypod[verify]" in table_iii_markdown(mech, pp.load_motion(EXAMPLE, mech), EXAMPLE)
 

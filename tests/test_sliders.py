@@ -13,7 +13,7 @@ import polypod as pp
 from polypod import SingularityKind, Status
 from polypod.multibody.placement import BASE, PLATFORM
 from polypod.multibody.tree import describe
-from polypod.verify import table, verify_states
+from polypod.verify import comparison, verify_states
 
 sys.path.insert(0, str(Path(__file__).parent))
 
@@ -134,7 +134,7 @@ def test_a_fault_is_found(monkeypatch, fault):
         del leg["stroke"]
     fault(tables)
     wrong, tree = pp.Mechanism.from_dict(tables), describe(sliders.mechanism("pus"))
-    monkeypatch.setattr(table, "describe", lambda mech: tree)
+    monkeypatch.setattr(comparison, "describe", lambda mech: tree)
     found = verify_states(wrong, *states("pus"), LOAD)
     assert not found.agrees
     assert FAULTS[fault] <= exceeding(found)

@@ -14,7 +14,7 @@ import polypod as pp
 from polypod.multibody.placement import BASE, PLATFORM
 from polypod.multibody.tree import depth_first, describe, joint_values, release
 from polypod.vectors import inverse
-from polypod.verify import table, verify, verify_states
+from polypod.verify import comparison, engines, quantity_errors, verify, verify_states
 from polypod.verify.verdict import as_markdown
 
 pin = pytest.importorskip("pinocchio")
@@ -134,7 +134,7 @@ def test_the_example_motion():
     assert found.agrees
     assert (found.mechanism, found.motion) == (LU, LU)
     others = {"platform_acceleration", "platform_eps", "idle_torques"}
-    assert rows(found).keys() == table.QUANTITIES.keys() - others
+    assert rows(found).keys() == quantity_errors.QUANTITIES.keys() - others
     assert found.comparisons[0].version == pin.__version__
     assert 0.0 < found.comparisons[0].closure < 1e-13
     worst = rows(found)["forces"]
@@ -200,7 +200,7 @@ def test_a_model_in_another_order_is_refused():
     tree = describe(pp.load(LU))
     bodies = sorted(tree.bodies, key=lambda body: body.name.endswith("piston"))
     with pytest.raises(RuntimeError, match="depth-first"):
-        Tree(table.Multibody(**{**vars(tree), "bodies": tuple(bodies)}))
+        Tree(comparison.Multibody(**{**vars(tree), "bodies": tuple(bodies)}))
 
 
 @pytest.mark.parametrize("name", [LU, "rod-lined"])
@@ -430,7 +430,7 @@ def test_a_fault_in_the_product_is_found(monkeypatch, fault):
     wrong = pp.Mechanism.from_dict(tables)
     states = (case.T[:6], case.twist[:6], case.acceleration[:6])
     assert verify_states(case.mech, *states).agrees
-    monkeypatch.setattr(table, "describe", lambda mech: describe(case.mech))
+    monkeypatch.setattr(comparison, "describe", lambda mech: describe(case.mech))
     found = verify_states(wrong, *states)
     assert not found.agrees
     assert FAULTS[fault] <= exceeding(found)
@@ -444,7 +444,7 @@ def test_command(run):
     assert (status, err) == (0, "")
     assert f"Errors against Pinocchio {pin.__version__}" in out
     assert "5 of 5 states compared; all errors within 1e-09" in out
-    for quantity, (title, *_) in table.QUANTITIES.items():
+    for quantity, (title, *_) in quantity_errors.QUANTITIES.items():
         assert (title in out) != quantity.startswith(("platform", "idle"))
 
 
@@ -466,7 +466,7 @@ def test_command_json(run):
 
 
 def test_command_without_the_engine(run, monkeypatch):
-    monkeypatch.setattr(table, "find_spec", lambda module: None)
+    monkeypatch.setattr(engines, "find_spec", lambda module: None)
     status, out, err = run("verify", LU, LU)
     assert (status, out) == (2, "")
     assert err == (

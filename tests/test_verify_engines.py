@@ -15,7 +15,7 @@ import polypod as pp
 from polypod.multibody.placement import PLATFORM
 from polypod.multibody.tree import describe
 from polypod.vectors import turned
-from polypod.verify import integrate, table, verify_states
+from polypod.verify import comparison, engines, integrate, verify_states
 from polypod.verify.constraints import Links, Square, jacobian, redundant, residual, rows_of
 
 pytest.importorskip("exudyn")
@@ -110,7 +110,7 @@ def test_paper_s_mechanism(engine):
     assert found.comparisons[0].compared == 3
     for row in found.comparisons[0].rows:
         assert row.approximate == (row.quantity != "freedoms")
-        assert row.tolerance == (table.ENGINES[engine].approximate if row.approximate else found.tolerance)
+        assert row.tolerance == (engines.ENGINES[engine].approximate if row.approximate else found.tolerance)
     (note,) = found.comparisons[0].notes
     assert note.startswith({"exudyn": "Released", "mujoco": "Soft loops"}[engine])
 
@@ -272,7 +272,7 @@ def test_states_without_answer(engine):
     twist[1] += 1.0  # a motion that breaks them
     acceleration[2, 0] = np.nan
     found = verify_states(mech, pose, twist, acceleration, engines=[engine]).comparisons[0]
-    title = table.ENGINES[engine].title
+    title = engines.ENGINES[engine].title
     assert (found.compared, found.agrees) == (0, False)
     assert {f"Polypod: {s}" for s in ("OFF_CONSTRAINT", "INVALID_INPUT")} <= found.without_answer.keys()
     assert any(key.startswith(title) for key in found.without_answer)
@@ -302,7 +302,7 @@ def test_a_fault_in_the_product_is_found(monkeypatch, fault, engine):
     tables = case.mech.to_dict()
     fault(tables)
     wrong = pp.Mechanism.from_dict(tables)
-    monkeypatch.setattr(table, "describe", lambda mech: describe(case.mech))
+    monkeypatch.setattr(comparison, "describe", lambda mech: describe(case.mech))
     states = (case.T[:2], case.twist[:2], case.acceleration[:2])
     assert "platform_acceleration" in exceeding(verify_states(wrong, *states, engines=[engine]))
 
@@ -358,7 +358,7 @@ def test_integrate_wrong_arguments(monkeypatch):
     for steps in ((10,), (10, 30), (4, 8)):
         with pytest.raises(pp.PolypodError, match="steps"):
             integrate(mech, short_motion(mech), steps=steps)
-    monkeypatch.setattr(table, "find_spec", lambda module: None)
+    monkeypatch.setattr(engines, "find_spec", lambda module: None)
     with pytest.raises(pp.PolypodError, match=r"Exudyn is not installed.*polypod\[verify\]"):
         integrate(mech, short_motion(mech))
 
@@ -415,7 +415,7 @@ def test_samples_are_for_the_comparison(run, monkeypatch):
 
 @pytest.mark.parametrize(("engine", "title"), [("exudyn", "Exudyn"), ("mujoco", "MuJoCo")])
 def test_command_without_the_engine(run, monkeypatch, engine, title):
-    monkeypatch.setattr(table, "find_spec", lambda module: None)
+    monkeypatch.setattr(engines, "find_spec", lambda module: None)
     status, out, err = run("verify", LU, LU, "--engine", engine)
     assert (status, out) == (2, "")
     install = f"pip install {engine}, or all engines with: pip install polypod[verify]"

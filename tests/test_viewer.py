@@ -9,6 +9,7 @@ import threading
 import time
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -16,13 +17,13 @@ import pytest
 import polypod as pp
 from polypod.bodies.palette import rgb
 from polypod.errors import UnknownNameError
-from polypod.viewer import words
+from polypod.viewer import html
 from polypod.viewer.message_filter import is_own_page, is_update, is_value
 from polypod.viewer.model import NEAR_LIMIT, Level, Model
 from polypod.viewer.player import Player, track_of
 from polypod.viewer.scene import SINGULAR, platform_color
-from polypod.viewer.server import ViewerError, require_viser
 from polypod.viewer.static import check_static_path, write_static
+from polypod.viewer.viser_access import ViewerError, inner_parts, require_viser
 from polypod.viewer.worker import SETTLED, Worker
 
 NAME = "lu-3spu-2rpu-r"
@@ -165,7 +166,7 @@ def test_a_passive_leg_follows(tricept):
     assert "passive" in model.refusal
     view = model.view()
     assert view.slack.tolist() == [np.inf] * 4
-    text = words.numbers(view, mech, {"z": (-np.inf, 0.5)}, 12.0, 0.004)
+    text = html.numbers(view, mech, {"z": (-np.inf, 0.5)}, 12.0, 0.004)
     assert "<b>post" not in text
     assert "&lt;b&gt;post" in text
     assert "passive" in text
@@ -200,7 +201,7 @@ def test_limits_are_told_and_coloured(mech, motion):
         limits = mech.limits(pose)
         first = limits.names[limits.binding]
         assert first in view.notes[0].text
-        assert f'data-level="{view.level.name}"' in words.status(view.notes, view.level)
+        assert f'data-level="{view.level.name}"' in html.status(view.notes, view.level)
 
 
 def test_singular_poses_are_told_and_coloured(mech):
@@ -410,6 +411,45 @@ def test_pages_of_other_sites_are_not_served():
     assert not is_own_page(rebound, local=True)
     lab = {"Host": "robot.lab:8080", "Origin": "http://robot.lab:8080"}
     assert is_own_page(lab, local=False)
+
+
+def test_viser_has_the_inner_parts_that_the_filter_needs():
+    """If this fails, viser has moved them: mend `viewer/viser_access.py` before pages are served."""
+    viser = pytest.importorskip("viser")
+    server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
+    try:
+        parts = inner_parts(server)
+        slider = server.gui.add_slider("a", 0.0, 1.0, 0.1, 0.5)
+        assert [*parts.controls.values()] == [slider]
+        assert parts.connections == {}
+    finally:
+        server.stop()
+
+
+@pytest.mark.parametrize(
+    ("gone", "told"),
+    [
+        ("_websock_server", "ViserServer._websock_server"),
+        ("_handle_incoming_message", "WebsockServer._handle_incoming_message"),
+        ("_live_connections", "WebsockServer._live_connections"),
+        ("_gui_input_handle_from_uuid", "GuiApi._gui_input_handle_from_uuid"),
+    ],
+)
+def test_inner_parts_that_have_moved_are_named(gone, told):
+    viser = pytest.importorskip("viser")
+
+    async def handle(client_id, message):
+        raise AssertionError
+
+    def having(**parts):
+        return SimpleNamespace(**{name: part for name, part in parts.items() if name != gone})
+
+    server = having(
+        _websock_server=having(_handle_incoming_message=handle, _live_connections={}),
+        gui=having(_gui_input_handle_from_uuid={}),
+    )
+    with pytest.raises(ViewerError, match=f"viser {viser.__version__} has no {told}, by which"):
+        inner_parts(server)
 
 
 # --- without viser, and wrong calls -------------------------------------------------------------------------

@@ -1,8 +1,9 @@
 """The import graph of both languages: rooms, circles of imports, and imports that climb.
 
-A room is a folder (or a file of its own) right under the root of the sources. `python tools/imports.py` fails where files
-or rooms import one another in a circle, or where a Rust room imports one that `lib.rs` declares after it: `lib.rs` lists
-rooms from the ground up. Imports inside functions and for type checkers count as well. `--graph` prints who imports whom.
+A room is a folder (or a file of its own) right under the root of the sources. `python tools/imports.py` fails
+where files or rooms import one another in a circle, or where a room imports one that is listed after it:
+`lib.rs` declares the Rust rooms from the ground up, and the docstring of the package lists the Python ones.
+Imports inside functions and for type checkers count as well. `--graph` prints who imports whom.
 """
 
 from __future__ import annotations
@@ -105,7 +106,7 @@ def _tree(text: str) -> Iterator[tuple[str, ...]]:
 
 
 def rooms_of(graph: Graph) -> Graph:
-    """The same between rooms: folders, or files that stand alone. The root's own `__init__.py` is above all."""
+    """The same between rooms: folders, or files that stand alone. The root's `__init__.py` is above all."""
     rooms: Graph = {}
     for file, imported in graph.items():
         rooms.setdefault(_room(file), set()).update(_room(other) for other in imported)
@@ -117,7 +118,7 @@ def _room(file: str) -> str:
 
 
 def circles(graph: Graph) -> list[list[str]]:
-    """Groups that import one another in circles, the largest first (Tarjan's strongly connected components)."""
+    """Groups that import one another in circles, the largest first, by Tarjan's algorithm."""
     order: dict[str, int] = {}
     low: dict[str, int] = {}
     stack: list[str] = []
@@ -171,15 +172,19 @@ def _report(name: str, graph: Graph, floors: list[str], shown: bool) -> Iterable
 
 def main() -> int:
     """Checks the tree that this script stands in, or another."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    raw = argparse.RawDescriptionHelpFormatter
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=raw)
     parser.add_argument("--tree", type=Path, default=Path(__file__).parents[1], help="root of the repository")
     parser.add_argument("--graph", action="store_true", help="print which room imports which")
     given = parser.parse_args()
     crate, package = given.tree / "crates/core/src", given.tree / "python/polypod"
     floors = re.findall(r"^(?:pub(?:\(crate\))? )?mod (\w+);", (crate / "lib.rs").read_text(), re.MULTILINE)
+    contents = ast.get_docstring(ast.parse((package / "__init__.py").read_text())) or ""
+    listed = re.findall(r"^- ((?:`\w+`(?:, )?)+):", contents, re.MULTILINE)
+    rooms = [room for line in listed for room in re.findall(r"\w+", line)]
     faults = [
         *_report("Rust", rust_files(crate), floors, given.graph),
-        *_report("Python", python_files(package), [], given.graph),
+        *_report("Python", python_files(package), rooms, given.graph),
     ]
     print("\n".join(faults) or "no circles, nothing climbs")
     return 1 if faults else 0

@@ -9,8 +9,8 @@ inverse dynamics carried to the platform, and the solve for active forces and mu
 import numpy as np
 import pinocchio as pin
 
-from polypod.vectors import cross
 from polypod.multibody.tree import describe, release
+from polypod.vectors import cross
 from polypod.verify.pinocchio import Tree
 
 

@@ -3,29 +3,16 @@
 from __future__ import annotations
 
 import sys
-from importlib import import_module
 from typing import Annotated
 
 import typer
 
+from polypod.cli import demo, export, fk, info, new, report, simulate, solve, verify, view, workspace
+from polypod.cli import list as list_
 from polypod.errors import PolypodError
 
-# The modules of the commands, in the order of the help. A command imports what is heavy where it needs it,
-# so that help comes at once.
-COMMANDS = (
-    "demo",
-    "list",
-    "info",
-    "new",
-    "solve",
-    "simulate",
-    "fk",
-    "workspace",
-    "verify",
-    "view",
-    "export",
-    "report",
-)
+# In the order of the help. A command imports what is heavy where it needs it, so that help comes at once.
+COMMANDS = (demo, list_, info, new, solve, simulate, fk, workspace, verify, view, export, report)
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -34,8 +21,8 @@ app = typer.Typer(
     rich_markup_mode="rich",
     epilog="Start with: [bold]polypod demo[/bold]",
 )
-for name in COMMANDS:
-    app.add_typer(import_module(f"polypod.cli.{name}").app)
+for command in COMMANDS:
+    app.add_typer(command.app)
 
 
 def main() -> None:

@@ -40,8 +40,9 @@ def view(
     """
     from polypod.mechanism import load
     from polypod.motion.motion_file import load_motion
-    from polypod.viewer.server import LOCAL, Viewer, require_viser
+    from polypod.viewer.server import LOCAL, Viewer
     from polypod.viewer.static import check_static_path, write_static
+    from polypod.viewer.viser_access import require_viser
 
     require_viser()
     if static is not None:

@@ -4,8 +4,10 @@
 forces over time. The engines are installed by `pip install polypod[verify]`.
 """
 
-from polypod.verify.comparison import ENGINES, TOLERANCE, Comparison, Row, Verification, verify, verify_states
+from polypod.verify.comparison import TOLERANCE, Comparison, Verification, verify, verify_states
+from polypod.verify.engines import ENGINES
 from polypod.verify.integrate import Integration, integrate
+from polypod.verify.quantity_errors import Row
 
 __all__ = [
     "ENGINES",

@@ -20,7 +20,8 @@ from polypod.mechanism import Mechanism
 from polypod.motion.motion import Motion
 from polypod.multibody.tree import describe
 from polypod.solution.solve import states_along
-from polypod.verify.comparison import engine_class, load_at_o
+from polypod.verify.comparison import load_at_o
+from polypod.verify.engines import engine_class
 
 Array = NDArray[np.float64]
 

@@ -7,7 +7,6 @@ import io
 import logging
 import socket
 from statistics import median
-from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -18,24 +17,10 @@ from polypod.motion.motion import Motion
 from polypod.viewer.message_filter import is_own_page, is_update
 from polypod.viewer.model import Model
 from polypod.viewer.player import Player, track_of
+from polypod.viewer.viser_access import ViewerError, inner_parts, require_viser
 from polypod.viewer.worker import Worker
 
 LOCAL = ("127.0.0.1", "localhost", "::1")
-
-
-class ViewerError(PolypodError):
-    """A page that cannot be served, or a file of one that cannot be written."""
-
-
-def require_viser() -> ModuleType:
-    """The package viser; ViewerError with what to install where it lacks."""
-    try:
-        import viser
-    except ImportError:
-        raise ViewerError(
-            "viser is not installed, which the viewer needs; install it with: pip install polypod[viewer]"
-        ) from None
-    return viser
 
 
 class Viewer:
@@ -72,8 +57,12 @@ class Viewer:
             self._server = viser.ViserServer(
                 host=host, port=port, label=f"Polypod: {mech.name}", verbose=False
             )
+        try:
+            _restrict(self._server, local=host in LOCAL)
+        except ViewerError:
+            self._server.stop()
+            raise
         self.url = f"http://{f'[{host}]' if ':' in host else host}:{self._server.get_port()}"
-        _restrict(self._server, local=host in LOCAL)
         self._worker = Worker(self._answer, tick=self._tick, settled=self._settle)
         gui, scene = self._server.gui, self._server.scene
         gui.configure_theme(show_logo=False, show_share_button=False, control_width="large")
@@ -150,23 +139,21 @@ def _restrict(server: Any, *, local: bool) -> None:
 
     viser itself would also take files and open a way to the machine from outside when a page asks for it.
     """
-    from viser._messages import GuiUpdateMessage
-
-    socket_server, controls = server._websock_server, server.gui._gui_input_handle_from_uuid
-    handle = socket_server._handle_incoming_message
+    parts = inner_parts(server)
+    handle = parts.sockets._handle_incoming_message
 
     async def handle_values(client_id: Any, message: Any) -> None:
-        if isinstance(message, GuiUpdateMessage):
-            control = controls.get(message.uuid)
+        if isinstance(message, parts.update):
+            control = parts.controls.get(message.uuid)
             if control is not None and is_update(message.updates, control.value):
                 await handle(client_id, message)
 
     async def check_origin(connection: Any) -> None:
-        web = socket_server._live_connections.get(connection.client_id)
+        web = parts.connections.get(connection.client_id)
         if web is not None and not is_own_page(web.request.headers, local=local):
             await web.close(1008, "not a page of this server")
 
-    socket_server._handle_incoming_message = handle_values
-    socket_server.on_client_connect(check_origin)
+    parts.sockets._handle_incoming_message = handle_values
+    parts.sockets.on_client_connect(check_origin)
     # Garbage ends the connection that it came on; no need for its traceback on the terminal.
     logging.getLogger("websockets.server").setLevel(logging.CRITICAL + 1)

@@ -15,7 +15,8 @@ from polypod.mechanism import Mechanism
 from polypod.motion.motion import Motion
 from polypod.viewer.model import Model
 from polypod.viewer.player import Player, Track, track_of
-from polypod.viewer.server import ViewerError, largest_force, require_viser
+from polypod.viewer.server import largest_force
+from polypod.viewer.viser_access import ViewerError, require_viser
 
 FRAMES_PER_SECOND = 30.0
 MOST_FRAMES = 600
