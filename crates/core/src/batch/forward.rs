@@ -5,8 +5,8 @@ use super::block::{self, Codes, Pieces, Rows};
 use super::checks::{actuated_values, forwards, is_rotation, joint_limits, raw_pose, then, with_legs};
 use crate::forward_kinematics::assembly_modes::{self, Start};
 use crate::forward_kinematics::gauss_newton;
-use crate::forward_kinematics::newton::{self, Asked, Found, asked_of_all};
-use crate::forward_kinematics::newton_lanes::{forward_kinematics_of, load_asked, put_numbers};
+use crate::forward_kinematics::newton::{self, Asked, Found};
+use crate::forward_kinematics::newton_lanes::{self, put_numbers};
 use crate::kinematics::leg;
 use crate::limits::margins::Seen;
 use crate::model::mechanism::Mechanism;
@@ -35,7 +35,12 @@ pub fn forward_kinematics(
     };
     let fields = [("pose", vec![4, 4]), ("residual", vec![]), ("iterations", vec![])];
     let asked = |i: usize| actuated_values(mech, lengths, i);
-    if !continued && !gauss_newton::serves(mech) {
+    if !continued {
+        let of_lanes = if gauss_newton::serves(mech) {
+            gauss_newton::forward_kinematics_of
+        } else {
+            newton_lanes::forward_kinematics_of
+        };
         return block::in_pieces(n, fields, IN_LANES, |rows, piece| {
             let (mut states, mut numbers) = (Vec::with_capacity(WIDTH), Vec::with_capacity(WIDTH));
             let last = piece.end;
@@ -48,7 +53,7 @@ pub fn forward_kinematics(
                     }
                 }
                 if states.len() == WIDTH || i + 1 == last {
-                    let found = forward_kinematics_of(mech, &states);
+                    let found = of_lanes(mech, &states);
                     let asked = states.iter().map(|(asked, _)| &asked[..]);
                     let checked = checks(mech, asked.zip(found.iter().map(|f| &f.pose)));
                     for ((i, found), check) in numbers.drain(..).zip(&found).zip(checked) {
@@ -122,28 +127,25 @@ fn put_found(rows: &mut Rows<'_, 3>, i: usize, found: &Found, status: Status) {
 
 /// Whether a pose that was found for lengths is one that the mechanism can be in, and within its limits.
 fn check_found(mech: &Mechanism, asked: &[f64], pose: &Pose<f64>) -> Status {
-    if mech.is_redundant() {
-        let asked: Vec<Asked<f64>> = asked_of_all(mech, asked).collect();
-        return check(mech, &asked, pose).status();
-    }
     block::read(checks(mech, [(asked, pose)])[0]).0
 }
 
 /// The same of at most [`WIDTH`] lengths and poses, as codes.
 fn checks<'a>(mech: &Mechanism, found: impl IntoIterator<Item = (&'a [f64], &'a Pose<f64>)>) -> Row {
-    let (mut poses, mut to, mut codes) = ([[0.0; WIDTH]; 12], [[0.0; WIDTH]; 6], [0.0; WIDTH]);
+    let (mut poses, mut codes) = ([[0.0; WIDTH]; 12], [0.0; WIDTH]);
+    let mut numbers = vec![[0.0; WIDTH]; mech.actuated().count()];
     for (k, (asked, pose)) in found.into_iter().enumerate() {
         put(&mut poses, k, pose);
-        put_numbers(mech, &mut to, k, asked);
+        put_numbers(mech, &mut numbers, k, asked);
     }
-    lanes::dispatch(Checks { mech, poses: &poses, numbers: &to, codes: &mut codes });
+    lanes::dispatch(Checks { mech, poses: &poses, numbers: &numbers, codes: &mut codes });
     codes
 }
 
 struct Checks<'a> {
     mech: &'a Mechanism,
     poses: &'a Poses,
-    numbers: &'a [Row; 6],
+    numbers: &'a [Row],
     codes: &'a mut Row,
 }
 
@@ -153,7 +155,8 @@ impl Task for Checks<'_> {
         let (mech, mut k) = (self.mech, 0);
         while k < WIDTH {
             let pose = load::<V>(self.poses, k);
-            let asked = load_asked(mech, self.numbers, k);
+            let legs = self.numbers.iter().zip(mech.actuated());
+            let asked: Vec<_> = legs.map(|(row, (_, leg))| Asked::of(leg, V::load(&row[k..]))).collect();
             check(mech, &asked, &pose).store(&mut self.codes[k..]);
             k += V::WIDTH;
         }

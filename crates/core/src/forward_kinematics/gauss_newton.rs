@@ -6,15 +6,18 @@ use nalgebra::{DMatrix, DVector};
 use crate::forward_kinematics::newton::{
     Asked, FOLD_PIVOTS, Found, LONGEST_STEP, are_coordinates, asked_of_all, error, step_of,
 };
+use crate::forward_kinematics::newton_lanes::{Guessed, put_numbers};
 use crate::kinematics::constraint;
 use crate::kinematics::leg;
 use crate::kinematics::redundant_rows::RedundantRows;
 use crate::kinematics::rows::{self, Row};
 use crate::mobility::degrees_of_freedom::RANK_TOLERANCE;
-use crate::model::mechanism::{Leg, Mechanism};
+use crate::model::mechanism::Mechanism;
 use crate::model::status::Status;
+use crate::number::lanes::{self, Lanes, Task, WIDTH};
 use crate::numerics::svd::Svd;
 use crate::spatial::motion::pure_row;
+use crate::spatial::packed_poses::{Poses, load, put};
 use crate::spatial::{Pose, Wrench};
 
 /// Steps after which the iteration is given up.
@@ -43,91 +46,119 @@ pub fn serves(mech: &Mechanism) -> bool {
     mech.is_redundant() || mech.mobility.uncontrolled > 0
 }
 
-/// What a pose misses, in pure numbers, and the step that takes most of it off.
-struct Misses {
-    legs: Vec<f64>,
-    others: Vec<f64>,
+/// What a pose misses, in pure numbers, and the step that takes most of it off; for one state, or one in each lane.
+#[derive(Clone, Copy, Debug, Default)]
+struct Misses<T> {
+    /// The largest errors of lengths and of constraints.
+    legs: T,
+    others: T,
+    /// What must fall: the sum of the squares of what lengths miss, and what constraints miss, not squared, so that they are
+    /// kept at the cost of lengths that contradict one another.
+    merit: T,
     /// (v/Λ, ω), and its size.
-    step: [f64; 6],
-    size: f64,
-    /// What is left of the square of what lengths miss, if rows stay as they are.
-    left: f64,
+    step: [T; 6],
+    size: T,
+    /// What is left of the sum of squares, if rows stay as they are.
+    left: T,
     /// Least to greatest singular value of the legs' rows on what the others allow, or a lower bound of it.
-    pivots: f64,
+    pivots: T,
 }
 
-impl Misses {
-    fn at(
-        mech: &Mechanism,
-        asked: &[Asked<f64>],
-        pose: &Pose<f64>,
-        room: Option<&mut RedundantRows<f64>>,
-    ) -> Option<Self> {
+/// Rows of the legs from the places that are asked for (those of a slider have no branch), what lengths miss, and what the other
+/// rows miss, all as pure numbers.
+struct Errors<V> {
+    rows: Vec<[V; 6]>,
+    legs: Vec<V>,
+    others: Vec<V>,
+}
+
+impl<V: Lanes> Errors<V> {
+    fn new(mech: &Mechanism) -> Self {
+        let (n, others) = (mech.actuated().count(), rows::others(mech).count());
+        Errors { rows: vec![[V::zero(); 6]; n], legs: vec![V::zero(); n], others: vec![V::zero(); others] }
+    }
+
+    #[inline(always)]
+    fn set(&mut self, mech: &Mechanism, asked: &[Asked<V>], pose: &Pose<V>) {
         let scale = mech.characteristic_length;
-        // Rows and errors of the lengths from the places that are asked for: those of a slider have no branch.
-        let of_leg = |((_, leg), asked): ((usize, &Leg), &Asked<f64>)| {
+        for (k, (_, leg)) in mech.actuated().enumerate() {
             let (e, r) = leg::vectors(leg, pose);
-            let r = asked.vector(leg, r);
-            (pure_row(Wrench::at(e, r.unit()), scale), (r.norm() - asked.square.sqrt()) / scale)
-        };
-        let (rows, legs): (Vec<[f64; 6]>, Vec<f64>) = mech.actuated().zip(asked).map(of_leg).unzip();
-        let off = |row| match row {
-            Row::Constraint(c) => constraint::value(c, pose) * constraint::length(c, scale) / scale,
-            Row::Leg(_) | Row::Idle(_) => 0.0,
-        };
-        let others: Vec<f64> = rows::others(mech).map(off).collect();
-        let regular = room.and_then(|room| by_reflections(mech, pose, &rows, [&legs, &others], room));
-        let (step, pivots) = match regular {
-            Some(found) => found,
-            None => by_singular_values(mech, pose, &rows, [&legs, &others])?,
-        };
-        let missed =
-            |(row, miss): (&[f64; 6], &f64)| miss + row.iter().zip(&step).map(|(a, b)| a * b).sum::<f64>();
-        let left = rows.iter().zip(&legs).map(missed).map(|x| x * x).sum();
-        let size = step.iter().map(|x| x * x).sum::<f64>().sqrt();
-        size.is_finite().then_some(Misses { legs, others, step, size, left, pivots })
-    }
-
-    /// What must fall: the square of what lengths miss, and what constraints miss, not squared, so that they are kept at the
-    /// cost of lengths that contradict one another.
-    fn merit(&self) -> f64 {
-        self.legs.iter().map(|x| x * x).sum::<f64>() + self.others.iter().map(|x| x.abs()).sum::<f64>()
+            let r = asked[k].vector(leg, r);
+            self.rows[k] = pure_row(Wrench::at(e, r.unit()), scale);
+            self.legs[k] = (r.norm() - asked[k].square.sqrt()) / V::lit(scale);
+        }
+        for (k, row) in rows::others(mech).enumerate() {
+            self.others[k] = match row {
+                Row::Constraint(c) => {
+                    constraint::value(c, pose).scale(constraint::length(c, scale)) / V::lit(scale)
+                }
+                Row::Leg(_) | Row::Idle(_) => V::zero(),
+            };
+        }
     }
 }
 
-/// The step and the legs' regularity by Householder reflections; none where rows are as good as dependent.
-fn by_reflections(
-    mech: &Mechanism,
-    pose: &Pose<f64>,
-    rows: &[[f64; 6]],
-    [legs, others]: [&[f64]; 2],
-    room: &mut RedundantRows<f64>,
-) -> Option<([f64; 6], f64)> {
-    room.factor_with(mech, pose, rows);
-    let step = room.least_step(legs, others);
-    (room.regular > RANK_TOLERANCE).then_some((step, room.regular))
+impl<V: Lanes> Misses<V> {
+    /// With a step that is known.
+    #[inline(always)]
+    fn with(errors: &Errors<V>, step: [V; 6], pivots: V) -> Self {
+        let zero = V::zero();
+        let mut found =
+            Misses { legs: zero, others: zero, merit: zero, step, size: zero, left: zero, pivots };
+        for (row, miss) in errors.rows.iter().zip(&errors.legs) {
+            let mut rest = *miss;
+            for i in 0..6 {
+                rest = row[i].mul_add(step[i], rest);
+            }
+            found.left = rest.mul_add(rest, found.left);
+            found.merit = miss.mul_add(*miss, found.merit);
+            // NaN stays: nothing is greater.
+            found.legs = V::select(found.legs.greater(miss.abs()), found.legs, miss.abs());
+        }
+        for miss in &errors.others {
+            found.merit = found.merit + miss.abs();
+            found.others = V::select(found.others.greater(miss.abs()), found.others, miss.abs());
+        }
+        for x in step {
+            found.size = x.mul_add(x, found.size);
+        }
+        found.size = found.size.sqrt();
+        found
+    }
+
+    /// By Householder reflections, for rows that are independent.
+    #[inline(always)]
+    fn by_reflections(
+        mech: &Mechanism,
+        pose: &Pose<V>,
+        errors: &Errors<V>,
+        rows: &mut RedundantRows<V>,
+    ) -> Self {
+        rows.factor_with(mech, pose, &errors.rows);
+        let step = rows.least_step(&errors.legs, &errors.others);
+        Self::with(errors, step, rows.regular)
+    }
 }
 
-/// The same by singular values, for rows of any rank.
-fn by_singular_values(
-    mech: &Mechanism,
-    pose: &Pose<f64>,
-    rows: &[[f64; 6]],
-    [legs, others]: [&[f64]; 2],
-) -> Option<([f64; 6], f64)> {
-    let scale = mech.characteristic_length;
-    let (legs, others) = (DVector::from_column_slice(legs), DVector::from_column_slice(others));
-    let of_legs = DMatrix::from_fn(rows.len(), 6, |i, j| rows[i][j]);
-    // First what the others ask for, then what the legs ask for within that; each of least size.
-    let rest: Vec<[f64; 6]> = rows::others(mech).map(|row| row.pure(pose, scale)).collect();
-    let held = Svd::of(&DMatrix::from_fn(others.len(), 6, |i, j| rest[i][j]))?;
-    let (first, rank) = least(&held, &others);
-    let allowed = held.v_t.rows(rank, 6 - rank).transpose();
-    let on_allowed = Svd::of(&(&of_legs * &allowed))?;
-    let (second, _) = least(&on_allowed, &(&legs + &of_legs * &first));
-    let step = first + allowed * second;
-    let last = on_allowed.values.len().checked_sub(1)?;
-    Some((std::array::from_fn(|i| step[i]), on_allowed.values[last] / on_allowed.values[0]))
+impl Misses<f64> {
+    /// By singular values, for rows of any rank.
+    fn by_singular_values(mech: &Mechanism, pose: &Pose<f64>, errors: &Errors<f64>) -> Option<Self> {
+        let scale = mech.characteristic_length;
+        let legs = DVector::from_column_slice(&errors.legs);
+        let others = DVector::from_column_slice(&errors.others);
+        let of_legs = DMatrix::from_fn(legs.len(), 6, |i, j| errors.rows[i][j]);
+        // First what the others ask for, then what the legs ask for within that; each of least size.
+        let rest: Vec<[f64; 6]> = rows::others(mech).map(|row| row.pure(pose, scale)).collect();
+        let held = Svd::of(&DMatrix::from_fn(others.len(), 6, |i, j| rest[i][j]))?;
+        let (first, rank) = least(&held, &others);
+        let allowed = held.v_t.rows(rank, 6 - rank).transpose();
+        let on_allowed = Svd::of(&(&of_legs * &allowed))?;
+        let (second, _) = least(&on_allowed, &(&legs + &of_legs * &first));
+        let step = first + allowed * second;
+        let last = on_allowed.values.len().checked_sub(1)?;
+        let pivots = on_allowed.values[last] / on_allowed.values[0];
+        Some(Self::with(errors, std::array::from_fn(|i| step[i]), pivots))
+    }
 }
 
 /// The least x for which `m x = -b` in the sense of least squares, and the rank of m.
@@ -140,57 +171,164 @@ fn least(m: &Svd, b: &DVector<f64>) -> (DVector<f64>, usize) {
     (x, rank)
 }
 
+/// One state on its way.
+struct Search<'a> {
+    mech: &'a Mechanism,
+    lengths: &'a [f64],
+    pose: Pose<f64>,
+    at: Option<Misses<f64>>,
+    share: f64,
+    iterations: u32,
+    /// Where it is looked at next; none once it is done.
+    trial: Option<Pose<f64>>,
+    /// Whether rows depend on one another on the way, so that reflections do not serve.
+    dependent: bool,
+}
+
+impl<'a> Search<'a> {
+    fn new(mech: &'a Mechanism, lengths: &'a [f64], guess: &Pose<f64>) -> Self {
+        let trial = are_coordinates(mech, lengths).then_some(*guess);
+        Search { mech, lengths, pose: *guess, at: None, share: 1.0, iterations: 0, trial, dependent: false }
+    }
+
+    /// Goes on by what is missed at the trial, if that is known.
+    fn judge(&mut self, found: Option<Misses<f64>>) {
+        let Some(trial) = self.trial.take() else { return };
+        let found = found.filter(|found| found.size.is_finite());
+        match (self.at, found) {
+            (None, None) => return,
+            (None, Some(found)) => self.at = Some(found),
+            (Some(at), found) => {
+                let near = at.size <= NEAR;
+                let promised = 0.1 * self.share * (at.merit - at.left).max(0.0);
+                match found {
+                    Some(found) if near || found.merit <= at.merit - promised => {
+                        (self.pose, self.at) = (trial, Some(found));
+                        self.share = (2.0 * self.share).min(1.0);
+                        // Rounding shrinks no further.
+                        if near && found.size >= 0.9 * at.size {
+                            return;
+                        }
+                    }
+                    _ => self.share *= 0.25,
+                }
+                if self.share <= SMALLEST_SHARE {
+                    return;
+                }
+            }
+        }
+        let Some(at) = self.at.filter(|at| at.size > ROUNDING && self.iterations < STEPS) else { return };
+        self.iterations += 1;
+        self.share = self.share.min(LONGEST_STEP / at.size);
+        self.trial = Some(self.pose.stepped(&step_of(self.mech, at.step, self.share)));
+    }
+
+    fn found(&self) -> Found {
+        let (mech, pose) = (self.mech, self.pose);
+        let nothing = |status| Found { pose, residual: f64::NAN, iterations: 0, sign: f64::NAN, status };
+        if !are_coordinates(mech, self.lengths) {
+            return nothing(Status::InvalidInput);
+        }
+        let Some(at) = self.at else { return nothing(Status::NotConverged) };
+        let met = at.legs <= AGREEMENT && at.others <= KEPT;
+        let status = match (met, at.size <= NEAR) {
+            (true, _) if mech.mobility.uncontrolled > 0 || !(at.pivots > FOLD_PIVOTS) => Status::Singular,
+            (true, _) => Status::Ok,
+            (false, true) => Status::Inconsistent,
+            (false, false) => Status::NotConverged,
+        };
+        let sign = if mech.mobility.uncontrolled > 0 { 0.0 } else { 1.0 };
+        let asked: Vec<Asked<f64>> = asked_of_all(mech, self.lengths).collect();
+        Found { pose, residual: error(mech, &asked, &pose), iterations: self.iterations, sign, status }
+    }
+}
+
 /// A pose near the guess with the given lengths of all actuated legs. Where the nearest one does not have them, they contradict
 /// one another, and the status says so.
 #[must_use]
 pub fn forward_kinematics(mech: &Mechanism, lengths: &[f64], guess: &Pose<f64>) -> Found {
-    let nothing = Found {
-        pose: *guess,
-        residual: f64::NAN,
-        iterations: 0,
-        sign: f64::NAN,
-        status: Status::InvalidInput,
+    let state = (lengths.to_vec(), *guess);
+    let [found] = &forward_kinematics_of(mech, std::slice::from_ref(&state))[..] else {
+        unreachable!("one answer for one state")
     };
-    if !are_coordinates(mech, lengths) {
-        return nothing;
+    *found
+}
+
+/// The same of at most [`WIDTH`] states side by side, each as if it were alone.
+#[must_use]
+pub fn forward_kinematics_of(mech: &Mechanism, states: &[Guessed]) -> Vec<Found> {
+    let mut searches: Vec<Search> =
+        states.iter().map(|(lengths, guess)| Search::new(mech, lengths, guess)).collect();
+    let mut numbers = vec![[1.0; WIDTH]; mech.actuated().count()];
+    for (k, (lengths, _)) in states.iter().enumerate() {
+        put_numbers(mech, &mut numbers, k, lengths);
     }
-    let lost = Found { status: Status::NotConverged, ..nothing };
-    let asked: Vec<Asked<f64>> = asked_of_all(mech, lengths).collect();
-    let mut room = (mech.mobility.uncontrolled == 0).then(|| RedundantRows::new(mech));
-    let Some(mut at) = Misses::at(mech, &asked, guess, room.as_mut()) else { return lost };
-    let (mut pose, mut share, mut iterations) = (*guess, 1.0_f64, 0);
-    while at.size > ROUNDING && iterations < STEPS {
-        iterations += 1;
-        share = share.min(LONGEST_STEP / at.size);
-        let next = pose.stepped(&step_of(mech, at.step, share));
-        let trial = Misses::at(mech, &asked, &next, room.as_mut());
-        let near = at.size <= NEAR;
-        let promised = 0.1 * share * (at.merit() - at.left).max(0.0);
-        match trial {
-            Some(trial) if near || trial.merit() <= at.merit() - promised => {
-                // Rounding shrinks no further.
-                let done = near && trial.size >= 0.9 * at.size;
-                (pose, at, share) = (next, trial, (2.0 * share).min(1.0));
-                if done {
-                    break;
-                }
+    let (mut poses, mut found) = ([[0.0; WIDTH]; 12], [Misses::default(); WIDTH]);
+    // By reflections as long as rows are independent.
+    while mech.mobility.uncontrolled == 0 && searches.iter().any(|search| search.trial.is_some()) {
+        for (k, search) in searches.iter().enumerate() {
+            put(&mut poses, k, search.trial.as_ref().unwrap_or(&search.pose));
+        }
+        lanes::dispatch(Evaluation { mech, poses: &poses, numbers: &numbers, result: &mut found });
+        for (search, found) in searches.iter_mut().zip(found).filter(|(search, _)| search.trial.is_some()) {
+            if found.pivots > RANK_TOLERANCE {
+                search.judge(Some(found));
+            } else {
+                (search.dependent, search.trial) = (true, None);
             }
-            _ => share *= 0.25,
-        }
-        if share <= SMALLEST_SHARE {
-            break;
         }
     }
-    let met = at.legs.iter().all(|x| x.abs() <= AGREEMENT) && at.others.iter().all(|x| x.abs() <= KEPT);
-    let status = match (met, at.size <= NEAR) {
-        (true, _) if mech.mobility.uncontrolled > 0 || !(at.pivots > FOLD_PIVOTS) => Status::Singular,
-        (true, _) => Status::Ok,
-        (false, true) => Status::Inconsistent,
-        (false, false) => Status::NotConverged,
+    let alone = |(search, (lengths, guess)): (&Search, &Guessed)| {
+        let singular = search.dependent || mech.mobility.uncontrolled > 0;
+        if singular { by_singular_values(mech, lengths, guess) } else { search.found() }
     };
-    let sign = if mech.mobility.uncontrolled > 0 { 0.0 } else { 1.0 };
-    let residual = error(mech, &asked, &pose);
-    Found { pose, residual, iterations, sign, status }
+    searches.iter().zip(states).map(alone).collect()
+}
+
+/// The same of one state for rows of any rank.
+fn by_singular_values(mech: &Mechanism, lengths: &[f64], guess: &Pose<f64>) -> Found {
+    let asked: Vec<Asked<f64>> = asked_of_all(mech, lengths).collect();
+    let (mut search, mut errors) = (Search::new(mech, lengths, guess), Errors::new(mech));
+    while let Some(trial) = search.trial {
+        errors.set(mech, &asked, &trial);
+        search.judge(Misses::by_singular_values(mech, &trial, &errors));
+    }
+    search.found()
+}
+
+/// What poses side by side miss.
+struct Evaluation<'a> {
+    mech: &'a Mechanism,
+    poses: &'a Poses,
+    /// Of each actuated leg, what varies.
+    numbers: &'a [lanes::Row],
+    result: &'a mut [Misses<f64>; WIDTH],
+}
+
+impl Task for Evaluation<'_> {
+    #[inline(always)]
+    fn run<V: Lanes>(self) {
+        let Evaluation { mech, poses, numbers, result } = self;
+        let (mut rows, mut errors) = (RedundantRows::<V>::new(mech), Errors::new(mech));
+        let mut asked = vec![Asked::none(); numbers.len()];
+        for k in (0..WIDTH).step_by(V::WIDTH) {
+            let pose = load(poses, k);
+            for ((asked, numbers), (_, leg)) in asked.iter_mut().zip(numbers).zip(mech.actuated()) {
+                *asked = Asked::of(leg, V::load(&numbers[k..]));
+            }
+            errors.set(mech, &asked, &pose);
+            let found = Misses::by_reflections(mech, &pose, &errors, &mut rows);
+            let numbers = [found.legs, found.others, found.merit, found.size, found.left, found.pivots];
+            let mut stored = [[0.0; WIDTH]; 12];
+            for (row, x) in stored.iter_mut().zip(numbers.into_iter().chain(found.step)) {
+                x.store(row);
+            }
+            for lane in 0..V::WIDTH {
+                let [legs, others, merit, size, left, pivots, step @ ..] = stored.map(|row| row[lane]);
+                result[k + lane] = Misses { legs, others, merit, step, size, left, pivots };
+            }
+        }
+    }
 }
 
 #[cfg(test)]
@@ -214,6 +352,33 @@ mod tests {
                 assert!(constraint::largest_distance(&mech, &found.pose) < 1e-9);
                 lengths[1] = f64::NAN;
                 assert_eq!(forward_kinematics(&mech, &lengths, &mech.home).status, Status::InvalidInput);
+            }
+        }
+    }
+
+    #[test]
+    fn states_side_by_side_are_those_alone() {
+        for mech in [redundant(2), pentapod(6, "platform", 3)] {
+            // Guesses from next to the solution to far off, lengths that no pose has, and invalid ones.
+            let mut guessed: Vec<Guessed> = states(&mech, WIDTH, 4)
+                .iter()
+                .map(|state| {
+                    let lengths = mech.actuated().map(|(_, leg)| leg::position(leg, &state.pose).length);
+                    (lengths.collect(), mech.home)
+                })
+                .collect();
+            guessed[1].0[0] *= 1.01;
+            guessed[2].0[0] *= 10.0;
+            guessed[3].0[0] = f64::NAN;
+            guessed[4].0[0] = -1.0;
+            guessed[5].1.o.x = f64::NAN;
+            guessed[6].1.o.x += 0.3 * mech.characteristic_length;
+            let found = forward_kinematics_of(&mech, &guessed);
+            assert!(found.iter().filter(|found| found.status == Status::Ok).count() >= 2);
+            for (together, (lengths, guess)) in found.iter().zip(&guessed) {
+                let alone = forward_kinematics(&mech, lengths, guess);
+                assert_eq!(together.pose.matrix().map(f64::to_bits), alone.pose.matrix().map(f64::to_bits));
+                assert_eq!((together.status, together.iterations), (alone.status, alone.iterations));
             }
         }
     }

@@ -3,7 +3,7 @@
 
 use crate::forward_kinematics::newton::{
     Asked, CONTRACTION, FOLD_PIVOTS, Found, LONGEST_STEP, PIECE_STEPS, ROUNDING, SMALL_STEP, System,
-    are_coordinates, asked, error, forward_kinematics, numbers, polish, step_of, system,
+    are_coordinates, asked, error, forward_kinematics, polish, step_of, system,
 };
 use crate::model::mechanism::Mechanism;
 use crate::model::status::Status;
@@ -225,10 +225,10 @@ pub(crate) fn newton<V: Lanes>(mech: &Mechanism, pose: &Pose<V>, numbers: &[Row;
     Newton { next, size: sum.sqrt(), residual: largest, pivots, sign }
 }
 
-/// What varies of the legs of a state: see [`numbers`].
-pub(crate) fn put_numbers(mech: &Mechanism, rows: &mut [Row; 6], k: usize, coordinates: &[f64]) {
-    for (row, number) in rows.iter_mut().zip(numbers(mech, coordinates)) {
-        row[k] = number;
+/// What varies of the legs of a state: see [`numbers`](crate::forward_kinematics::newton::numbers).
+pub(crate) fn put_numbers(mech: &Mechanism, rows: &mut [Row], k: usize, coordinates: &[f64]) {
+    for ((row, (_, leg)), &q) in rows.iter_mut().zip(mech.actuated()).zip(coordinates) {
+        row[k] = leg.drive.number(q);
     }
 }
 

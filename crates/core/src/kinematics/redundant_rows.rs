@@ -81,6 +81,7 @@ impl<V: Lanes> RedundantRows<V> {
     }
 
     /// The same with given rows of the legs, in pure numbers.
+    #[inline(always)]
     pub(crate) fn factor_with(&mut self, mech: &Mechanism, pose: &Pose<V>, legs: &[[V; 6]]) {
         self.legs.copy_from_slice(legs);
         self.set_others(mech, pose);
@@ -89,6 +90,7 @@ impl<V: Lanes> RedundantRows<V> {
 
     /// The least step (v/Λ, ω) that takes off what the others miss and, within that, most of what legs miss in the sense of
     /// least squares; all in pure numbers, lengths and values divided by Λ.
+    #[inline(always)]
     pub(crate) fn least_step(&mut self, legs: &[V], others: &[V]) -> [V; 6] {
         let mut rates = [V::zero(); 6];
         for (k, miss) in others.iter().enumerate() {
