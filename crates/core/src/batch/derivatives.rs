@@ -13,7 +13,8 @@ use crate::kinematics::leg;
 use crate::kinematics::rows::RowNumbers;
 use crate::model::mechanism::Mechanism;
 use crate::model::status::Status;
-use crate::number::lanes::Lanes;
+use crate::number::lanes::{Lanes, work};
+use crate::spatial::{Motion, Wrench};
 
 /// A field for the forces of all legs and one for the multipliers.
 type Pair = [FieldId; 2];
@@ -194,7 +195,9 @@ impl Derivatives<'_> {
         let (mech, count) = (self.mech, self.regressor.parameters.len());
         set_legs(mech, state, legs);
         for (k, unit) in columns.chunks_exact_mut(column.len()).enumerate() {
-            state.response.put(self.regressor.wrench(mech, &state.platform, legs, k), &[], unit);
+            let wrench =
+                V::apart(UnitWrench { regressor: &self.regressor, mech, platform: &state.platform, legs, k });
+            state.response.put(wrench, &[], unit);
         }
         for k in 0..count {
             self.regressor.put_by_bodies(columns, k, column);
@@ -254,7 +257,8 @@ impl Working<4> for Regressors<'_> {
         set_legs(mech, &state, legs);
         let (platform, width) = (&state.platform, self.regressor.parameters.len());
         for k in 0..width {
-            state.response.put(self.regressor.wrench(mech, platform, legs, k), &[], column);
+            let wrench = V::apart(UnitWrench { regressor: &self.regressor, mech, platform, legs, k });
+            state.response.put(wrench, &[], column);
             put(mech, answers, [y, y_constraint], width, k, column);
         }
         let load = self.loads.of(mech, &platform.pose, at);
@@ -276,7 +280,7 @@ fn solve<'a, V: Lanes>(
 ) -> (Solved<'a, V>, Codes<V>) {
     let (platform, load, codes) = states.loaded_at(mech, loads, at);
     response.set(mech, &platform.pose);
-    let motion = response.balance(resultant(mech, &platform, load), forces);
+    let motion = response.balance(V::apart(Resultant { mech, platform: &platform, load }), forces);
     let codes = solved(mech, forces, response.regular, codes);
     let (load, numbers) = (loads.given(mech, at), RowNumbers::of(mech));
     (Solved { platform, load, numbers, forces, motion, response }, codes)
@@ -284,9 +288,34 @@ fn solve<'a, V: Lanes>(
 
 #[inline(always)]
 fn set_legs<V: Lanes>(mech: &Mechanism, state: &Solved<V>, legs: &mut Vec<leg::State<V>>) {
-    legs.clear();
-    for leg in &mech.legs {
-        legs.push(leg::state(leg, &state.platform));
+    V::apart(SetLegs { mech, platform: &state.platform, legs });
+}
+
+work! {
+    SetLegs<'a, V> { mech: &'a Mechanism, platform: &'a Motion<V>, legs: &'a mut Vec<leg::State<V>> } -> () {
+        legs.clear();
+        for leg in &mech.legs {
+            legs.push(leg::state(leg, platform));
+        }
+    }
+}
+
+work! {
+    Resultant<'a, V> { mech: &'a Mechanism, platform: &'a Motion<V>, load: Wrench<V> } -> Wrench<V> {
+        resultant(mech, platform, load)
+    }
+}
+
+work! {
+    /// What a unit of the k-th parameter puts on the platform.
+    UnitWrench<'a, V> {
+        regressor: &'a Regressor,
+        mech: &'a Mechanism,
+        platform: &'a Motion<V>,
+        legs: &'a [leg::State<V>],
+        k: usize,
+    } -> Wrench<V> {
+        regressor.wrench(mech, platform, legs, k)
     }
 }
 

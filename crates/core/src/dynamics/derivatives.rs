@@ -12,7 +12,7 @@ use crate::kinematics::leg;
 use crate::kinematics::rows::{self, Row, RowNumbers};
 use crate::model::mechanism::{Leg, Mechanism};
 use crate::model::spec::Axes;
-use crate::number::lanes::Lanes;
+use crate::number::lanes::{Lanes, Work, work};
 use crate::number::real::{Constant, Dual, Jet, Real};
 use crate::spatial::{Acceleration, Motion, Pose, Twist, Vec3, Wrench};
 
@@ -60,18 +60,15 @@ impl<'a, 'b, V: Lanes> Imbalance<'a, 'b, V> {
         varied: &Motion<Dual<V>>,
         row: &mut usize,
     ) {
-        let leg = &mech.legs[index];
-        let place = leg::place(leg, &varied.pose);
-        let mut sum = leg_wrench(mech, index, leg, &place, varied);
-        if leg.actuated {
-            let unit = leg::row(leg, &place.0);
-            sum = sum + unit * Dual::new(self.at.forces[*row], V::zero());
-            if let Some(off) = self.rows.get_mut(*row) {
-                *off = unit.power(&self.motion).d;
+        let force = if mech.legs[index].actuated { self.at.forces[*row] } else { V::zero() };
+        let (sum, off) = V::apart(VariedLeg { mech, index, varied, force, motion: &self.motion });
+        self.wrench = self.wrench + sum;
+        if mech.legs[index].actuated {
+            if let Some(at) = self.rows.get_mut(*row) {
+                *at = off;
             }
             *row += 1;
         }
-        self.wrench = self.wrench + sum;
     }
 
     /// Adds what an idle freedom's or a constraint's row does, its multiplier kept.
@@ -88,6 +85,32 @@ impl<'a, 'b, V: Lanes> Imbalance<'a, 'b, V> {
     #[inline(always)]
     fn put(self, column: &mut [V]) {
         self.at.response.put(rate(self.wrench), self.rows, column);
+    }
+}
+
+/// A leg's own wrench with that of its active force, as they vary, and what its row then does to y.
+struct VariedLeg<'a, S, V: Real> {
+    mech: &'a Mechanism<S>,
+    index: usize,
+    varied: &'a Motion<Dual<V>>,
+    force: V,
+    motion: &'a Twist<Dual<V>>,
+}
+
+impl<S: Constant<Dual<V>>, V: Lanes> Work<V> for VariedLeg<'_, S, V> {
+    type Result = (Wrench<Dual<V>>, V);
+
+    #[inline(always)]
+    fn run(self) -> (Wrench<Dual<V>>, V) {
+        let VariedLeg { mech, index, varied, force, motion } = self;
+        let leg = &mech.legs[index];
+        let place = leg::place(leg, &varied.pose);
+        let own = leg_wrench(mech, index, leg, &place, varied);
+        if !leg.actuated {
+            return (own, V::zero());
+        }
+        let unit = leg::row(leg, &place.0);
+        (own + unit * Dual::new(force, V::zero()), unit.power(motion).d)
     }
 }
 
@@ -209,8 +232,7 @@ impl<V: Lanes> Coordinates<V> {
         given: &[bool],
         platform: &Motion<V>,
     ) -> Self {
-        let q = coordinate_sets::along(mech, set, platform);
-        Coordinates { q, pose: platform.jets(), following: Following::at(&still.mech, &still.set, &q, given) }
+        V::apart(CoordinatesAt { mech, set, still, given, platform })
     }
 
     /// What varies with a number of the set.
@@ -249,6 +271,19 @@ impl<V: Lanes> Coordinates<V> {
         }
         let variation = V::apart(Varying { mech: &by.mech, set: &by.set, q: &self.q, number: None });
         step_of(&self.pose, &self.following.with(variation))
+    }
+}
+
+work! {
+    CoordinatesAt<'a, V> {
+        mech: &'a Mechanism,
+        set: &'a Set,
+        still: &'a Varied,
+        given: &'a [bool],
+        platform: &'a Motion<V>,
+    } -> Coordinates<V> {
+        let q = coordinate_sets::along(mech, set, platform);
+        Coordinates { q, pose: platform.jets(), following: Following::at(&still.mech, &still.set, &q, given) }
     }
 }
 

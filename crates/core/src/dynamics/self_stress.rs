@@ -9,7 +9,7 @@ use crate::kinematics::idle;
 use crate::model::drive::Drive;
 use crate::model::joint::JointKind;
 use crate::model::mechanism::Mechanism;
-use crate::number::lanes::{Lanes, any};
+use crate::number::lanes::{Lanes, any, work};
 use crate::number::real::{Mask, Real};
 use crate::numerics::householder::Householder;
 use crate::spatial::{Motion, Pose, Vec3, Wrench};
@@ -226,7 +226,7 @@ impl<'a, V: Lanes> Solver<'a, V> {
     #[inline(always)]
     pub(crate) fn solve(&mut self, platform: &Motion<V>, load: Wrench<V>) -> Mask<V> {
         let (mech, pose) = (self.mech, &platform.pose);
-        self.given.set(mech, platform, load);
+        V::apart(SetGiven { given: &mut self.given, mech, platform, load });
         let Some(forces) = &mut self.forces else {
             for k in 0..mech.idle.len() {
                 self.props[k] = Wrench::new(Vec3::zero(), idle::axis(&mech.idle[k], pose));
@@ -259,29 +259,35 @@ impl<'a, V: Lanes> Solver<'a, V> {
     #[inline(always)]
     fn solve_given(&mut self, pose: &Pose<V>) -> Mask<V> {
         let mech = self.mech;
-        put_places(mech, pose, &mut self.places);
-        self.set_up(pose.o);
-        self.system.factor();
-        let regular = self.system.reciprocal_condition();
-        self.system.solve(&mut self.unknowns);
+        V::apart(SetPlaces { mech, pose, places: &mut self.places });
+        let regular = V::apart(SolveBalances { solver: self, o: pose.o });
         if !mech.is_redundant() {
             self.add_idle_torques();
         }
         self.put_on_platform(true);
-        put_reactions(mech, &self.places, &self.given, &self.on_platform, &mut self.least);
-        let holds = self.holds(pose.o, regular);
+        V::apart(PutReactions {
+            mech,
+            places: &self.places,
+            given: &self.given,
+            on_platform: &self.on_platform,
+            all: &mut self.least,
+        });
+        let holds = V::apart(Holds { solver: self, o: pose.o, regular });
 
         for k in 0..self.choice.count {
             self.system.null_vector(k, &mut self.unknowns);
             self.put_on_platform(false);
             let stress = &mut self.choice.stresses[k * self.places.len()..(k + 1) * self.places.len()];
-            put_reactions(mech, &self.places, &self.none, &self.on_platform, stress);
+            let (places, given, on_platform) = (&self.places, &self.none, &self.on_platform);
+            V::apart(PutReactions { mech, places, given, on_platform, all: stress });
         }
-        self.choice.turn(&self.places);
+        V::apart(TurnStresses { choice: &mut self.choice, places: &self.places });
         self.assumed.copy_from_slice(&self.least);
-        self.choice.make_least(&self.places, false, &mut self.least);
-        self.choice.make_least(&self.places, true, &mut self.assumed);
-        self.put_determinate();
+        let (choice, places) = (&mut self.choice, &self.places);
+        V::apart(MakeLeast { choice, places, couples_first: false, reactions: &mut self.least });
+        let (choice, places) = (&mut self.choice, &self.places);
+        V::apart(MakeLeast { choice, places, couples_first: true, reactions: &mut self.assumed });
+        V::apart(PutDeterminate { solver: self });
         self.constraint = constraint_wrench(mech, &self.places, pose, &self.assumed);
         holds
     }
@@ -332,7 +338,8 @@ impl<'a, V: Lanes> Solver<'a, V> {
             let below = rods + 3 * i;
             let [cylinder, piston] = self.given.legs[i];
             let leg = &mut self.legs[i];
-            leg.solve(mech.legs[i].drive, &self.places[below..below + 3], self.given.legs[i], length);
+            let (drive, places) = (mech.legs[i].drive, &self.places[below..below + 3]);
+            V::apart(SolveLeg { leg: &mut *leg, drive, places, given: self.given.legs[i], length });
             let (base, end) = (self.places[below].point, self.places[below + 2].point);
             let e = (end - o).scale(pure_lever);
             let particular = leg.particular.moved(e).array();
@@ -413,6 +420,75 @@ impl<'a, V: Lanes> Solver<'a, V> {
                 self.determinate_in_joint[j][k] = V::select(seen[k].at_most(open), one, zero);
             }
         }
+    }
+}
+
+// Parts of the solution, each a function of its own.
+work! {
+    SetGiven<'a, V> { given: &'a mut Given<V>, mech: &'a Mechanism, platform: &'a Motion<V>, load: Wrench<V> } -> () {
+        given.set(mech, platform, load);
+    }
+}
+work! {
+    SetPlaces<'a, V> { mech: &'a Mechanism, pose: &'a Pose<V>, places: &'a mut [Place<V>] } -> () {
+        put_places(mech, pose, places);
+    }
+}
+work! {
+    SolveLeg<'a, V> {
+        leg: &'a mut LegBalance<V>,
+        drive: Drive,
+        places: &'a [Place<V>],
+        given: [Wrench<V>; 2],
+        length: f64,
+    } -> () {
+        leg.solve(drive, places, given, length);
+    }
+}
+work! {
+    /// Puts the shares, and tells how regular the balances are.
+    SolveBalances<'a, 'b, V> { solver: &'a mut Solver<'b, V>, o: Vec3<V> } -> V {
+        solver.set_up(o);
+        solver.system.factor();
+        let regular = solver.system.reciprocal_condition();
+        solver.system.solve(&mut solver.unknowns);
+        regular
+    }
+}
+work! {
+    PutReactions<'a, V> {
+        mech: &'a Mechanism,
+        places: &'a [Place<V>],
+        given: &'a Given<V>,
+        on_platform: &'a [Wrench<V>],
+        all: &'a mut [Wrench<V>],
+    } -> () {
+        put_reactions(mech, places, given, on_platform, all);
+    }
+}
+work! {
+    Holds<'a, 'b, V> { solver: &'a mut Solver<'b, V>, o: Vec3<V>, regular: V } -> Mask<V> {
+        solver.holds(o, regular)
+    }
+}
+work! {
+    TurnStresses<'a, V> { choice: &'a mut Choice<V>, places: &'a [Place<V>] } -> () {
+        choice.turn(places);
+    }
+}
+work! {
+    MakeLeast<'a, V> {
+        choice: &'a mut Choice<V>,
+        places: &'a [Place<V>],
+        couples_first: bool,
+        reactions: &'a mut [Wrench<V>],
+    } -> () {
+        choice.make_least(places, couples_first, reactions);
+    }
+}
+work! {
+    PutDeterminate<'a, 'b, V> { solver: &'a mut Solver<'b, V> } -> () {
+        solver.put_determinate();
     }
 }
 

@@ -162,6 +162,34 @@ pub trait Work<V>: Sized {
     }
 }
 
+/// A work with its fields, its result and what it does: a function of its own for each kind of register.
+///
+/// Instructions of AVX are inlined only into functions that are compiled for AVX, so that in these all operands lie in memory
+/// until then. The compiler's time to bring them into registers grows with the square of the function's length: long functions
+/// are divided so.
+macro_rules! work {
+    (
+        $(#[$doc:meta])*
+        $name:ident<$($life:lifetime),+, $v:ident> { $($field:ident: $type:ty),+ $(,)? } -> $result:ty $body:block
+    ) => {
+        $(#[$doc])*
+        struct $name<$($life),+, $v: $crate::number::lanes::Lanes> {
+            $($field: $type),+
+        }
+
+        impl<$($life),+, $v: $crate::number::lanes::Lanes> $crate::number::lanes::Work<$v> for $name<$($life),+, $v> {
+            type Result = $result;
+
+            #[inline(always)]
+            fn run(self) -> $result {
+                let $name { $($field),+ } = self;
+                $body
+            }
+        }
+    };
+}
+pub(crate) use work;
+
 /// Instruction sets of this kind of processor with the width of their registers, the narrowest first.
 #[cfg(target_arch = "x86_64")]
 const SETS: &[(&str, usize)] = &[("sse2", 2), ("avx2", 4), ("avx512", 8)];
