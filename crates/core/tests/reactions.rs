@@ -5,7 +5,7 @@ mod common;
 
 use common::{mechanisms, moving, parts, states};
 use polypod_core::dynamics::inverse_dynamics;
-use polypod_core::dynamics::joint_reactions::{self, Given, Place};
+use polypod_core::dynamics::joint_reactions::{self, Given, JointFrame};
 use polypod_core::dynamics::self_stress;
 use polypod_core::kinematics::leg;
 use polypod_core::model::mechanism::{Body, Mechanism};
@@ -269,7 +269,7 @@ fn kernels<T: Scalar>(mech: &Mechanism, state: &Motion<f64>, on_platform: &[Wren
     };
     let load = load(mech, state);
     let given = Given::of(mech, &platform, Wrench::new(lift(load.force), lift(load.torque)));
-    let places: Vec<Place<T>> = joint_reactions::places(mech, &platform.pose);
+    let places: Vec<JointFrame<T>> = joint_reactions::places(mech, &platform.pose);
     let tops: Vec<_> = on_platform.iter().map(|w| Wrench::new(lift(w.force), lift(w.torque))).collect();
     let all = joint_reactions::reactions(mech, &places, &given, &tops);
     let joints = joint_reactions::joints(mech);

@@ -4,7 +4,7 @@ use super::block::{self, At, Codes};
 use crate::dynamics::forward_dynamics::square;
 use crate::kinematics::constraint;
 use crate::kinematics::leg::{self, Position};
-use crate::limits::margins::Seen;
+use crate::limits::margins::LegCache;
 use crate::model::limit::Limit;
 use crate::model::mechanism::{Constraint, Leg, Mechanism, Turning};
 use crate::model::status::Status;
@@ -232,7 +232,7 @@ pub(super) fn then(first: Status, second: impl FnOnce() -> Status) -> Status {
 /// The first limit of a joint that a pose breaks.
 #[inline(always)]
 pub(super) fn within_limits<V: Lanes>(mech: &Mechanism, pose: &Pose<V>, codes: Codes<V>) -> Codes<V> {
-    within_limits_of(mech, pose, &mut Seen::default(), codes)
+    within_limits_of(mech, pose, &mut LegCache::default(), codes)
 }
 
 /// The same with what has been seen of the legs.
@@ -240,7 +240,7 @@ pub(super) fn within_limits<V: Lanes>(mech: &Mechanism, pose: &Pose<V>, codes: C
 pub(super) fn within_limits_of<V: Lanes>(
     mech: &Mechanism,
     pose: &Pose<V>,
-    seen: &mut Seen<V>,
+    seen: &mut LegCache<V>,
     codes: Codes<V>,
 ) -> Codes<V> {
     V::apart(WithinLimits { mech, pose, seen, codes })
@@ -250,7 +250,7 @@ work! {
     WithinLimits<'a, V> {
         mech: &'a Mechanism,
         pose: &'a Pose<V>,
-        seen: &'a mut Seen<V>,
+        seen: &'a mut LegCache<V>,
         codes: Codes<V>,
     } -> Codes<V> {
         let mut codes = codes;

@@ -5,7 +5,9 @@ use super::block::{self, Answers, At, Codes, Operation, Pieces};
 use super::checks::{
     check_legs, finite, forwards, is_rotation, pose_at, raw_pose, then, with_legs, with_motion,
 };
-use crate::kinematics::coordinate_sets::{self, Conditions, Dependent, MAX_COORDINATES, Set, State, Values};
+use crate::kinematics::coordinate_sets::{
+    self, Conditions, CoordinateState, Dependent, MAX_COORDINATES, Set, Values,
+};
 use crate::model::mechanism::Mechanism;
 use crate::model::status::Status;
 use crate::number::lanes::{Lanes, work};
@@ -199,7 +201,7 @@ work! {
 }
 
 /// A state is none where a leg has no frame or points backwards, or where coordinates that were all given break the constraints.
-fn checked(mech: &Mechanism, mut state: State, all_given: bool) -> State {
+fn checked(mech: &Mechanism, mut state: CoordinateState, all_given: bool) -> CoordinateState {
     let pose = &state.platform.pose;
     // A root that a constraint has only because a leg has no frame there is none.
     state.status = then(state.status, || check_legs(mech, pose));

@@ -4,7 +4,7 @@ use super::block::{self, Answers, At, Codes, Working};
 use super::checks::{solved, within_limits};
 use super::{FieldId, Loads, States, Table};
 use crate::assembly::geometric_parameters;
-use crate::dynamics::derivatives::{self, Coordinates, DIRECTIONS, Solved, Varied};
+use crate::dynamics::derivatives::{self, DIRECTIONS, SolvedDynamics, Varied, VariedCoordinates};
 use crate::dynamics::force_balance::UnitForceResponse;
 use crate::dynamics::inverse_dynamics::resultant;
 use crate::dynamics::regressor::{self, Regressor};
@@ -90,7 +90,7 @@ struct Derivatives<'a> {
 struct Room<V> {
     response: UnitForceResponse<V>,
     forces: Vec<V>,
-    legs: Vec<leg::State<V>>,
+    legs: Vec<leg::LegState<V>>,
     by_motion: Vec<V>,
     by_bodies: Vec<V>,
     column: Vec<V>,
@@ -133,7 +133,7 @@ impl Working<17> for Derivatives<'_> {
         }
         self.put_by_bodies(&state, legs, by_bodies, column, pair(&ids, 6), answers);
 
-        let by = Coordinates::at(mech, self.set, &self.still, self.given, &state.platform);
+        let by = VariedCoordinates::at(mech, self.set, &self.still, self.given, &state.platform);
         let determined = by.following.pivots.greater(V::lit(DEPENDENT_PIVOTS));
         let mut sum = V::zero();
         for (k, &number) in self.numbers.iter().enumerate() {
@@ -185,8 +185,8 @@ impl Derivatives<'_> {
     #[inline(always)]
     fn put_by_bodies<V: Lanes>(
         &self,
-        state: &Solved<V>,
-        legs: &mut Vec<leg::State<V>>,
+        state: &SolvedDynamics<V>,
+        legs: &mut Vec<leg::LegState<V>>,
         columns: &mut [V],
         column: &mut [V],
         fields: Pair,
@@ -277,22 +277,22 @@ fn solve<'a, V: Lanes>(
     at: At,
     response: &'a mut UnitForceResponse<V>,
     forces: &'a mut [V],
-) -> (Solved<'a, V>, Codes<V>) {
+) -> (SolvedDynamics<'a, V>, Codes<V>) {
     let (platform, load, codes) = states.loaded_at(mech, loads, at);
     response.set(mech, &platform.pose);
     let motion = response.balance(V::apart(Resultant { mech, platform: &platform, load }), forces);
     let codes = solved(mech, forces, response.regular, codes);
     let (load, numbers) = (loads.given(mech, at), RowNumbers::of(mech));
-    (Solved { platform, load, numbers, forces, motion, response }, codes)
+    (SolvedDynamics { platform, load, numbers, forces, motion, response }, codes)
 }
 
 #[inline(always)]
-fn set_legs<V: Lanes>(mech: &Mechanism, state: &Solved<V>, legs: &mut Vec<leg::State<V>>) {
+fn set_legs<V: Lanes>(mech: &Mechanism, state: &SolvedDynamics<V>, legs: &mut Vec<leg::LegState<V>>) {
     V::apart(SetLegs { mech, platform: &state.platform, legs });
 }
 
 work! {
-    SetLegs<'a, V> { mech: &'a Mechanism, platform: &'a Motion<V>, legs: &'a mut Vec<leg::State<V>> } -> () {
+    SetLegs<'a, V> { mech: &'a Mechanism, platform: &'a Motion<V>, legs: &'a mut Vec<leg::LegState<V>> } -> () {
         legs.clear();
         for leg in &mech.legs {
             legs.push(leg::state(leg, platform));
@@ -312,7 +312,7 @@ work! {
         regressor: &'a Regressor,
         mech: &'a Mechanism,
         platform: &'a Motion<V>,
-        legs: &'a [leg::State<V>],
+        legs: &'a [leg::LegState<V>],
         k: usize,
     } -> Wrench<V> {
         regressor.wrench(mech, platform, legs, k)

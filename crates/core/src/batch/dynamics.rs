@@ -9,7 +9,7 @@ use crate::dynamics::force_balance::ForceSolver;
 use crate::dynamics::inverse_dynamics::{self, Balance};
 use crate::kinematics::leg;
 use crate::kinematics::rows;
-use crate::limits::margins::Seen;
+use crate::limits::margins::LegCache;
 use crate::mobility::degrees_of_freedom;
 use crate::model::mechanism::Mechanism;
 use crate::model::spec::Axes;
@@ -83,7 +83,7 @@ impl Working<3> for InverseDynamics<'_> {
         let (platform, codes) = self.states.platform(at);
         let (pose, load) = (&platform.pose, self.loads.of(mech, &platform.pose, at));
         let mut balance = Balance::new(mech, &platform, load);
-        let (mut legs, mut seen) = (Codes::ok(), Seen::default());
+        let (mut legs, mut seen) = (Codes::ok(), LegCache::default());
         for (k, leg) in mech.legs.iter().enumerate() {
             let place = leg::place(leg, pose);
             let (p, f) = &place;

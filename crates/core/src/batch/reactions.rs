@@ -4,7 +4,7 @@ use super::block::{self, Answers, At, Codes, Working};
 use super::checks::within_limits;
 use super::dynamics::Loads;
 use super::{States, Table};
-use crate::dynamics::joint_reactions::{self, Joint};
+use crate::dynamics::joint_reactions::{self, LinkJoint};
 use crate::dynamics::self_stress::Solver;
 use crate::model::mechanism::Mechanism;
 use crate::model::status::Status;
@@ -35,7 +35,7 @@ pub fn joint_reactions(mech: &Mechanism, states: &States, loads: &Loads, scale: 
 
 struct JointReactions<'a> {
     mech: &'a Mechanism,
-    joints: &'a [Joint],
+    joints: &'a [LinkJoint],
     states: &'a States<'a>,
     loads: &'a Loads<'a>,
     scale: f64,

@@ -4,10 +4,10 @@
 //! Forces are the solution of a linear balance, so that what is differentiated is the balance with the forces kept:
 //! what it is off by, per unit of the direction, the forces must answer.
 
-use crate::assembly::geometric_parameters::{self, Parameter};
+use crate::assembly::geometric_parameters::{self, GeometricParameter};
 use crate::dynamics::force_balance::UnitForceResponse;
 use crate::dynamics::inverse_dynamics::{leg_wrench, load_in_base, own_wrench};
-use crate::kinematics::coordinate_sets::{self, Following, Set, Values, Variation, Varying};
+use crate::kinematics::coordinate_sets::{self, ImplicitSensitivity, Set, Values, Variation, Varying};
 use crate::kinematics::leg;
 use crate::kinematics::rows::{self, Row, RowNumbers};
 use crate::model::mechanism::{Leg, Mechanism};
@@ -22,7 +22,7 @@ pub const DIRECTIONS: usize = 18;
 
 /// Inverse dynamics at a state, solved. Forces and multipliers, or how they change, stand in the order of J's rows.
 #[derive(Clone, Copy)]
-pub(crate) struct Solved<'a, V: Real> {
+pub(crate) struct SolvedDynamics<'a, V: Real> {
     pub platform: Motion<V>,
     /// The load as it is given, with its axes.
     pub load: (Wrench<V>, Axes),
@@ -36,7 +36,7 @@ pub(crate) struct Solved<'a, V: Real> {
 /// What a variation takes the balance off by, forces and multipliers kept: the wrench on the platform, and where actuators are
 /// redundant what each row of J then does to y \[T74\].
 struct Imbalance<'a, 'b, V: Real> {
-    at: &'a Solved<'a, V>,
+    at: &'a SolvedDynamics<'a, V>,
     wrench: Wrench<Dual<V>>,
     motion: Twist<Dual<V>>,
     rows: &'b mut [V],
@@ -45,7 +45,7 @@ struct Imbalance<'a, 'b, V: Real> {
 impl<'a, 'b, V: Lanes> Imbalance<'a, 'b, V> {
     /// `rows` is room for a number of each row where actuators are redundant, else empty.
     #[inline(always)]
-    fn new(at: &'a Solved<'a, V>, wrench: Wrench<Dual<V>>, rows: &'b mut [V]) -> Self {
+    fn new(at: &'a SolvedDynamics<'a, V>, wrench: Wrench<Dual<V>>, rows: &'b mut [V]) -> Self {
         rows.fill(V::zero());
         let motion = Twist::new(at.motion.v.with_rate(Vec3::zero()), at.motion.omega.with_rate(Vec3::zero()));
         Imbalance { at, wrench, motion, rows }
@@ -117,7 +117,12 @@ impl<S: Constant<Dual<V>>, V: Lanes> Work<V> for VariedLeg<'_, S, V> {
 /// Derivatives of active forces and multipliers by the motion in each direction, the other numbers kept: one column for each
 /// direction. `off` is room for a number of each row where actuators are redundant, else empty.
 #[inline(always)]
-pub(crate) fn by_motion<V: Lanes>(mech: &Mechanism, at: &Solved<V>, off: &mut [V], columns: &mut [V]) {
+pub(crate) fn by_motion<V: Lanes>(
+    mech: &Mechanism,
+    at: &SolvedDynamics<V>,
+    off: &mut [V],
+    columns: &mut [V],
+) {
     let width = mech.rows();
     for direction in 0..DIRECTIONS {
         let mut step = [V::zero(); DIRECTIONS];
@@ -217,13 +222,13 @@ fn along_step<V: Lanes>(by_motion: &[V], width: usize, row: usize, step: &[V; DI
 
 /// The coordinates at a state, and how the motion follows them.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Coordinates<V: Real> {
+pub(crate) struct VariedCoordinates<V: Real> {
     q: Values<Jet<V>>,
     pose: Pose<Jet<V>>,
-    pub following: Following<V>,
+    pub following: ImplicitSensitivity<V>,
 }
 
-impl<V: Lanes> Coordinates<V> {
+impl<V: Lanes> VariedCoordinates<V> {
     #[inline(always)]
     pub(crate) fn at(
         mech: &Mechanism,
@@ -281,9 +286,9 @@ work! {
         still: &'a Varied,
         given: &'a [bool],
         platform: &'a Motion<V>,
-    } -> Coordinates<V> {
+    } -> VariedCoordinates<V> {
         let q = coordinate_sets::along(mech, set, platform);
-        Coordinates { q, pose: platform.jets(), following: Following::at(&still.mech, &still.set, &q, given) }
+        VariedCoordinates { q, pose: platform.jets(), following: ImplicitSensitivity::at(&still.mech, &still.set, &q, given) }
     }
 }
 
@@ -313,7 +318,7 @@ impl Varied {
     }
 
     /// None if the set is none of the mechanism while it varies.
-    pub(crate) fn new(mech: &Mechanism, by: &Parameter, set: &Set) -> Option<Self> {
+    pub(crate) fn new(mech: &Mechanism, by: &GeometricParameter, set: &Set) -> Option<Self> {
         let mech = geometric_parameters::varied(mech, Some(by));
         let varies = |a: Vec3<Dual<f64>>| a.array().iter().any(|x| x.d != 0.0);
         let leg_varies = |leg: &Leg<Dual<f64>>| {
@@ -337,8 +342,8 @@ impl Varied {
 #[inline(always)]
 pub(crate) fn by_geometry<V: Lanes>(
     varied: &Varied,
-    at: &Solved<V>,
-    coordinates: &Coordinates<V>,
+    at: &SolvedDynamics<V>,
+    coordinates: &VariedCoordinates<V>,
     by_motion: &[V],
     off: &mut [V],
     column: &mut [V],

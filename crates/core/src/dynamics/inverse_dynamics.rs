@@ -72,7 +72,7 @@ pub(crate) fn leg_wrench<T: Real>(
     mech: &Mechanism<impl Constant<T>>,
     index: usize,
     leg: &Leg<impl Constant<T>>,
-    place: &leg::Place<T>,
+    place: &leg::LegPlacement<T>,
     platform: &Motion<T>,
 ) -> Wrench<T> {
     let state = leg::moving(leg, place, platform);
@@ -91,7 +91,7 @@ pub(crate) fn links_wrench<T: Real>(
     mech: &Mechanism<impl Constant<T>>,
     leg: &Leg<impl Constant<T>>,
     [cylinder, piston]: [&Body; 2],
-    state: &leg::State<T>,
+    state: &leg::LegState<T>,
 ) -> Wrench<T> {
     let axes = state.frame.axes;
     let at_base = axes.transpose_mul(Vec3::lift(mech.gravity));
@@ -114,7 +114,7 @@ pub(crate) fn links_wrench<T: Real>(
 /// Weight and inertial force of a link of a leg \[T8\] \[T13\], and its torque about the link's reference point;
 /// `push` is gravity less the acceleration of that point.
 #[inline(always)]
-fn turning_force<T: Real>(body: &Body, turn: &leg::Turn<T>, push: Vec3<T>) -> (Vec3<T>, Vec3<T>) {
+fn turning_force<T: Real>(body: &Body, turn: &leg::LegRotation<T>, push: Vec3<T>) -> (Vec3<T>, Vec3<T>) {
     let center = Vec3::lift(body.center);
     let force =
         inertial_force(body, push, turn.eps.cross(center) + turn.omega.cross(turn.omega.cross(center)));
@@ -127,7 +127,7 @@ pub(crate) fn carried_rod<T: Real>(
     mech: &Mechanism<impl Constant<T>>,
     rod: &Rod<impl Constant<T>>,
     body: &Body,
-    leader: &leg::State<T>,
+    leader: &leg::LegState<T>,
 ) -> Wrench<T> {
     // Torque of its weight and inertia about its line [Eq. 36, 42].
     let about = Vec3::lift(rod.axis).dot(rod_wrench(mech, rod, body, leader).torque);
@@ -142,7 +142,7 @@ pub(crate) fn rod_wrench<T: Real>(
     mech: &Mechanism<impl Constant<T>>,
     rod: &Rod<impl Constant<T>>,
     body: &Body,
-    leader: &leg::State<T>,
+    leader: &leg::LegState<T>,
 ) -> Wrench<T> {
     let (axis, n) = (Vec3::lift(rod.axis), leader.frame.n());
     let turn = leg::rod_turn(axis, leader);
@@ -221,7 +221,7 @@ impl<T: Real> Balance<T> {
         mech: &Mechanism<S>,
         index: usize,
         leg: &Leg<S>,
-        place: &leg::Place<T>,
+        place: &leg::LegPlacement<T>,
         platform: &Motion<T>,
     ) {
         self.wrench = self.wrench + leg_wrench(mech, index, leg, place, platform);

@@ -3,7 +3,7 @@
 
 use crate::dynamics::force_balance::ForceSolver;
 use crate::dynamics::joint_reactions::{
-    Given, Joint, Place, constraint_wrench, pure, put_places, put_reactions, put_unbalanced,
+    Given, JointFrame, LinkJoint, constraint_wrench, pure, put_places, put_reactions, put_unbalanced,
 };
 use crate::kinematics::idle;
 use crate::model::drive::Drive;
@@ -34,7 +34,7 @@ const SWEEPS: usize = 60;
 /// Reactions of all joints in the order of [`joints`](crate::dynamics::joint_reactions::joints), each at its joint's point in base axes.
 #[derive(Clone, Debug)]
 pub struct Reactions {
-    pub places: Vec<Place<f64>>,
+    pub places: Vec<JointFrame<f64>>,
     /// Universal joints carry no couple, as far as balance lets them \[T47\].
     pub assumed: Vec<Wrench<f64>>,
     /// The least in sum of squares \[T47\].
@@ -51,7 +51,7 @@ pub struct Reactions {
 #[must_use]
 pub fn solve(
     mech: &Mechanism,
-    joints: &[Joint],
+    joints: &[LinkJoint],
     platform: &Motion<f64>,
     load: Wrench<f64>,
     scale: f64,
@@ -72,7 +72,7 @@ pub fn solve(
 /// Solves for the reactions at one state after the other.
 pub(crate) struct Solver<'a, V> {
     mech: &'a Mechanism,
-    joints: &'a [Joint],
+    joints: &'a [LinkJoint],
     legs: Vec<LegBalance<V>>,
     /// Wrenches on the platform that hold what nothing in the mechanism does: at o, torques divided by the characteristic
     /// length.
@@ -87,7 +87,7 @@ pub(crate) struct Solver<'a, V> {
     choice: Choice<V>,
     /// Where actuators are redundant.
     forces: Option<ForceSolver<V>>,
-    pub places: Vec<Place<V>>,
+    pub places: Vec<JointFrame<V>>,
     /// See [`Reactions`]; 1 for components that are determinate, else 0.
     pub assumed: Vec<Wrench<V>>,
     pub least: Vec<Wrench<V>>,
@@ -111,7 +111,7 @@ struct LegBalance<V> {
 }
 
 impl<V: Lanes> LegBalance<V> {
-    fn new(joints: &[Joint], first: usize, pushed: bool) -> Self {
+    fn new(joints: &[LinkJoint], first: usize, pushed: bool) -> Self {
         let mut free: Vec<_> = joints
             .iter()
             .enumerate()
@@ -137,7 +137,13 @@ impl<V: Lanes> LegBalance<V> {
 
     /// A joint carries nothing where it is free: no power along its motion there, seen at b \[T44\].
     #[inline(always)]
-    fn solve(&mut self, drive: Drive, places: &[Place<V>], [first, second]: [Wrench<V>; 2], length: f64) {
+    fn solve(
+        &mut self,
+        drive: Drive,
+        places: &[JointFrame<V>],
+        [first, second]: [Wrench<V>; 2],
+        length: f64,
+    ) {
         let end = places[2].point;
         // What is given above the joint, at its point.
         let at_base = second.moved(end - places[0].point);
@@ -186,7 +192,7 @@ impl<V: Lanes> LegBalance<V> {
 
 impl<'a, V: Lanes> Solver<'a, V> {
     /// Room for the states of a mechanism; `scale`, m, is what torques are divided by in the least sum of squares.
-    pub(crate) fn new(mech: &'a Mechanism, joints: &'a [Joint], scale: f64) -> Self {
+    pub(crate) fn new(mech: &'a Mechanism, joints: &'a [LinkJoint], scale: f64) -> Self {
         let (rods, mut count, mut legs) = (mech.rods.len(), 0, Vec::new());
         for i in 0..mech.legs.len() {
             let pushed = mech.is_redundant() && mech.legs[i].actuated;
@@ -213,7 +219,7 @@ impl<'a, V: Lanes> Solver<'a, V> {
             unbalanced: vec![V::zero(); free + 6],
             choice: Choice::new(joints, count.saturating_sub(rows), mech.characteristic_length, scale),
             forces: mech.is_redundant().then(|| ForceSolver::new(mech)),
-            places: vec![Place::nowhere(); all],
+            places: vec![JointFrame::nowhere(); all],
             assumed: vec![Wrench::zero(); all],
             least: vec![Wrench::zero(); all],
             determinate: vec![[V::zero(); 6]; all],
@@ -430,7 +436,7 @@ work! {
     }
 }
 work! {
-    SetPlaces<'a, V> { mech: &'a Mechanism, pose: &'a Pose<V>, places: &'a mut [Place<V>] } -> () {
+    SetPlaces<'a, V> { mech: &'a Mechanism, pose: &'a Pose<V>, places: &'a mut [JointFrame<V>] } -> () {
         put_places(mech, pose, places);
     }
 }
@@ -438,7 +444,7 @@ work! {
     SolveLeg<'a, V> {
         leg: &'a mut LegBalance<V>,
         drive: Drive,
-        places: &'a [Place<V>],
+        places: &'a [JointFrame<V>],
         given: [Wrench<V>; 2],
         length: f64,
     } -> () {
@@ -458,7 +464,7 @@ work! {
 work! {
     PutReactions<'a, V> {
         mech: &'a Mechanism,
-        places: &'a [Place<V>],
+        places: &'a [JointFrame<V>],
         given: &'a Given<V>,
         on_platform: &'a [Wrench<V>],
         all: &'a mut [Wrench<V>],
@@ -472,14 +478,14 @@ work! {
     }
 }
 work! {
-    TurnStresses<'a, V> { choice: &'a mut Choice<V>, places: &'a [Place<V>] } -> () {
+    TurnStresses<'a, V> { choice: &'a mut Choice<V>, places: &'a [JointFrame<V>] } -> () {
         choice.turn(places);
     }
 }
 work! {
     MakeLeast<'a, V> {
         choice: &'a mut Choice<V>,
-        places: &'a [Place<V>],
+        places: &'a [JointFrame<V>],
         couples_first: bool,
         reactions: &'a mut [Wrench<V>],
     } -> () {
@@ -522,7 +528,7 @@ struct Choice<V> {
 }
 
 impl<V: Lanes> Choice<V> {
-    fn new(joints: &[Joint], count: usize, length: f64, scale: f64) -> Self {
+    fn new(joints: &[LinkJoint], count: usize, length: f64, scale: f64) -> Self {
         let is_universal = |&j: &usize| joints[j].kind == JointKind::Universal.letter();
         let universal: Vec<usize> = (0..joints.len()).filter(is_universal).collect();
         Choice {
@@ -546,7 +552,7 @@ impl<V: Lanes> Choice<V> {
 
     /// Turns the self-stresses into others, orthonormal as they are, whose couples are square to one another.
     #[inline(always)]
-    fn turn(&mut self, places: &[Place<V>]) {
+    fn turn(&mut self, places: &[JointFrame<V>]) {
         let (width, mut all) = (self.universal.len(), V::zero());
         for s in 0..self.count {
             for u in 0..width {
@@ -617,7 +623,7 @@ impl<V: Lanes> Choice<V> {
     /// Adds self-stresses until the reactions are least, but first until the couples in universal joints are, if asked to. A
     /// second time takes off the rounding of the first.
     #[inline(always)]
-    fn make_least(&mut self, places: &[Place<V>], couples_first: bool, reactions: &mut [Wrench<V>]) {
+    fn make_least(&mut self, places: &[JointFrame<V>], couples_first: bool, reactions: &mut [Wrench<V>]) {
         if self.count == 0 {
             return;
         }
@@ -648,7 +654,7 @@ impl<V: Lanes> Choice<V> {
 
     /// How much of each self-stress there is in the couples.
     #[inline(always)]
-    fn set_shares_of_couples(&mut self, places: &[Place<V>], reactions: &[Wrench<V>]) {
+    fn set_shares_of_couples(&mut self, places: &[JointFrame<V>], reactions: &[Wrench<V>]) {
         let width = self.universal.len();
         for s in 0..self.count {
             let mut sum = V::zero();
@@ -673,7 +679,7 @@ impl<V: Lanes> Choice<V> {
 
     /// The couple in a universal joint, divided by the characteristic length.
     #[inline(always)]
-    fn couple(&self, places: &[Place<V>], universal: usize, reactions: &[Wrench<V>]) -> V {
+    fn couple(&self, places: &[JointFrame<V>], universal: usize, reactions: &[Wrench<V>]) -> V {
         let j = self.universal[universal];
         places[j].axes.0[2].dot(reactions[j].torque).scale(1.0 / self.length)
     }

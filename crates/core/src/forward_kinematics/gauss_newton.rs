@@ -4,7 +4,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use crate::forward_kinematics::newton::{
-    Asked, FOLD_PIVOTS, Found, LONGEST_STEP, are_coordinates, asked_of_all, error, step_of,
+    FOLD_PIVOTS, FoundPose, LONGEST_STEP, LegTarget, are_coordinates, asked_of_all, error, step_of,
 };
 use crate::forward_kinematics::newton_lanes::{Guessed, put_numbers};
 use crate::kinematics::constraint;
@@ -79,7 +79,7 @@ impl<V: Lanes> Errors<V> {
     }
 
     #[inline(always)]
-    fn set(&mut self, mech: &Mechanism, asked: &[Asked<V>], pose: &Pose<V>) {
+    fn set(&mut self, mech: &Mechanism, asked: &[LegTarget<V>], pose: &Pose<V>) {
         let scale = mech.characteristic_length;
         for (k, (_, leg)) in mech.actuated().enumerate() {
             let (e, r) = leg::vectors(leg, pose);
@@ -223,9 +223,9 @@ impl<'a> Search<'a> {
         self.trial = Some(self.pose.stepped(&step_of(self.mech, at.step, self.share)));
     }
 
-    fn found(&self) -> Found {
+    fn found(&self) -> FoundPose {
         let (mech, pose) = (self.mech, self.pose);
-        let nothing = |status| Found { pose, residual: f64::NAN, iterations: 0, sign: f64::NAN, status };
+        let nothing = |status| FoundPose { pose, residual: f64::NAN, iterations: 0, sign: f64::NAN, status };
         if !are_coordinates(mech, self.lengths) {
             return nothing(Status::InvalidInput);
         }
@@ -238,15 +238,15 @@ impl<'a> Search<'a> {
             (false, false) => Status::NotConverged,
         };
         let sign = if mech.mobility.uncontrolled > 0 { 0.0 } else { 1.0 };
-        let asked: Vec<Asked<f64>> = asked_of_all(mech, self.lengths).collect();
-        Found { pose, residual: error(mech, &asked, &pose), iterations: self.iterations, sign, status }
+        let asked: Vec<LegTarget<f64>> = asked_of_all(mech, self.lengths).collect();
+        FoundPose { pose, residual: error(mech, &asked, &pose), iterations: self.iterations, sign, status }
     }
 }
 
 /// A pose near the guess with the given lengths of all actuated legs. Where the nearest one does not have them, they contradict
 /// one another, and the status says so.
 #[must_use]
-pub fn forward_kinematics(mech: &Mechanism, lengths: &[f64], guess: &Pose<f64>) -> Found {
+pub fn forward_kinematics(mech: &Mechanism, lengths: &[f64], guess: &Pose<f64>) -> FoundPose {
     let state = (lengths.to_vec(), *guess);
     let [found] = &forward_kinematics_of(mech, std::slice::from_ref(&state))[..] else {
         unreachable!("one answer for one state")
@@ -256,7 +256,7 @@ pub fn forward_kinematics(mech: &Mechanism, lengths: &[f64], guess: &Pose<f64>) 
 
 /// The same of at most [`WIDTH`] states side by side, each as if it were alone.
 #[must_use]
-pub fn forward_kinematics_of(mech: &Mechanism, states: &[Guessed]) -> Vec<Found> {
+pub fn forward_kinematics_of(mech: &Mechanism, states: &[Guessed]) -> Vec<FoundPose> {
     let mut searches: Vec<Search> =
         states.iter().map(|(lengths, guess)| Search::new(mech, lengths, guess)).collect();
     let mut numbers = vec![[1.0; WIDTH]; mech.actuated().count()];
@@ -286,8 +286,8 @@ pub fn forward_kinematics_of(mech: &Mechanism, states: &[Guessed]) -> Vec<Found>
 }
 
 /// The same of one state for rows of any rank.
-fn by_singular_values(mech: &Mechanism, lengths: &[f64], guess: &Pose<f64>) -> Found {
-    let asked: Vec<Asked<f64>> = asked_of_all(mech, lengths).collect();
+fn by_singular_values(mech: &Mechanism, lengths: &[f64], guess: &Pose<f64>) -> FoundPose {
+    let asked: Vec<LegTarget<f64>> = asked_of_all(mech, lengths).collect();
     let (mut search, mut errors) = (Search::new(mech, lengths, guess), Errors::new(mech));
     while let Some(trial) = search.trial {
         errors.set(mech, &asked, &trial);
@@ -310,11 +310,11 @@ impl Task for Evaluation<'_> {
     fn run<V: Lanes>(self) {
         let Evaluation { mech, poses, numbers, result } = self;
         let (mut rows, mut errors) = (RedundantRows::<V>::new(mech), Errors::new(mech));
-        let mut asked = vec![Asked::none(); numbers.len()];
+        let mut asked = vec![LegTarget::none(); numbers.len()];
         for k in (0..WIDTH).step_by(V::WIDTH) {
             let pose = load(poses, k);
             for ((asked, numbers), (_, leg)) in asked.iter_mut().zip(numbers).zip(mech.actuated()) {
-                *asked = Asked::of(leg, V::load(&numbers[k..]));
+                *asked = LegTarget::of(leg, V::load(&numbers[k..]));
             }
             errors.set(mech, &asked, &pose);
             let found = Misses::by_reflections(mech, &pose, &errors, &mut rows);

@@ -1,6 +1,6 @@
 //! Paths of complex solutions as equations change, such as squared leg lengths, several side by side \[T29\].
 
-use crate::forward_kinematics::newton::{Asked, FOLD_PIVOTS, System, system};
+use crate::forward_kinematics::newton::{FOLD_PIVOTS, LegTarget, System, system};
 use crate::kinematics::leg;
 use crate::model::mechanism::Mechanism;
 use crate::model::spec::Axes;
@@ -44,7 +44,7 @@ const CLOSE: f64 = 1e-8;
 
 /// How a path ends.
 #[derive(Clone, Copy, Debug)]
-pub enum End {
+pub enum PathEnd {
     Regular(Pose<C>),
     /// At a solution where several paths end.
     Singular(Pose<C>),
@@ -53,12 +53,12 @@ pub enum End {
     Lost,
 }
 
-impl End {
+impl PathEnd {
     /// The pose, if it is a regular one.
     #[must_use]
     pub fn regular(self) -> Option<Pose<C>> {
         match self {
-            End::Regular(pose) => Some(pose),
+            PathEnd::Regular(pose) => Some(pose),
             _ => None,
         }
     }
@@ -72,15 +72,15 @@ pub trait Family {
     fn spins(&self) -> bool;
 
     /// The equations at a place, and the rates at which their residuals fall there. Must be `#[inline(always)]`.
-    fn at<V: Lanes>(&self, place: &Place<Complex<V>>, t: V) -> (System<Complex<V>>, [Complex<V>; 6]);
+    fn at<V: Lanes>(&self, place: &PathPoint<Complex<V>>, t: V) -> (System<Complex<V>>, [Complex<V>; 6]);
 }
 
 /// What is asked of the legs along a straight path.
 #[derive(Clone, Copy, Debug)]
 pub struct Lengths<'a> {
     pub mech: &'a Mechanism,
-    pub from: [Asked<C>; 6],
-    pub to: [Asked<C>; 6],
+    pub from: [LegTarget<C>; 6],
+    pub to: [LegTarget<C>; 6],
 }
 
 impl Family for Lengths<'_> {
@@ -93,21 +93,21 @@ impl Family for Lengths<'_> {
     }
 
     #[inline(always)]
-    fn at<V: Lanes>(&self, place: &Place<Complex<V>>, t: V) -> (System<Complex<V>>, [Complex<V>; 6]) {
+    fn at<V: Lanes>(&self, place: &PathPoint<Complex<V>>, t: V) -> (System<Complex<V>>, [Complex<V>; 6]) {
         let Lengths { mech, from, to } = self;
         let unit = 1.0 / (mech.characteristic_length * mech.characteristic_length);
         let pose = place.pose();
-        let mut asked = [Asked::none(); 6];
+        let mut asked = [LegTarget::none(); 6];
         let mut rates = [Complex::<V>::zero(); 6];
         let mut i = 0;
         for leg in &mech.legs {
             if leg.actuated {
                 let (square, square_rate) = between(from[i].square, to[i].square, t);
                 let (place, place_rate) = between(from[i].place, to[i].place, t);
-                asked[i] = Asked { place, square };
-                let rate = Asked { place: place_rate, square: square_rate };
+                asked[i] = LegTarget { place, square };
+                let rate = LegTarget { place: place_rate, square: square_rate };
                 let r = asked[i].vector(leg, leg::vectors(leg, &pose).1);
-                rates[i] = Asked::change(leg, r, &rate).scale(unit);
+                rates[i] = LegTarget::change(leg, r, &rate).scale(unit);
                 i += 1;
             }
         }
@@ -117,7 +117,7 @@ impl Family for Lengths<'_> {
 
 /// The paths of the solutions of such equations.
 #[derive(Clone, Copy, Debug)]
-pub struct Path<F> {
+pub struct HomotopyPath<F> {
     pub family: F,
     /// Error of a predicted step, as a pure number.
     pub precision: f64,
@@ -125,7 +125,7 @@ pub struct Path<F> {
 
 /// Where one of several solutions on their way is.
 #[derive(Clone, Copy, Debug)]
-struct Traveller {
+struct TrackedPath {
     /// Which of them it is.
     start: usize,
     t: f64,
@@ -137,9 +137,9 @@ struct Traveller {
     before: (f64, f64),
 }
 
-impl Traveller {
+impl TrackedPath {
     fn new(start: usize) -> Self {
-        Traveller { start, t: 0.0, h: FIRST_STEP, error: 0.0, before: (0.0, 0.0) }
+        TrackedPath { start, t: 0.0, h: FIRST_STEP, error: 0.0, before: (0.0, 0.0) }
     }
 
     /// Whether a second Newton step is as much smaller than the first as it must be.
@@ -153,7 +153,7 @@ impl Traveller {
         let factor = 0.8 * (precision / error).powf(0.2);
         let factor = if factor.is_nan() { 0.25 } else { factor.clamp(0.25, 4.0) };
         if good {
-            *self = Traveller {
+            *self = TrackedPath {
                 t: self.t + self.h,
                 h: self.h * factor,
                 error,
@@ -174,17 +174,17 @@ impl Traveller {
     /// Takes the last step back.
     fn back(&mut self) {
         let (t, h) = self.before;
-        *self = Traveller { t, h: 0.25 * h, error: 0.0, before: (t, 0.25 * h), ..*self };
+        *self = TrackedPath { t, h: 0.25 * h, error: 0.0, before: (t, 0.25 * h), ..*self };
     }
 }
 
-impl<F: Family> Path<F> {
+impl<F: Family> HomotopyPath<F> {
     /// Follows the path from solutions at t = 0 by the classical Runge-Kutta method and Newton corrections.
     #[must_use]
-    pub fn follow(&self, starts: &[Pose<C>]) -> Vec<End> {
-        let mut ends = vec![End::Lost; starts.len()];
+    pub fn follow(&self, starts: &[Pose<C>]) -> Vec<PathEnd> {
+        let mut ends = vec![PathEnd::Lost; starts.len()];
         let mut waiting = starts.iter().enumerate();
-        let mut travellers: [Option<Traveller>; WIDTH] = [None; WIDTH];
+        let mut travellers: [Option<TrackedPath>; WIDTH] = [None; WIDTH];
         let (mut place, mut rate) = (ZERO, ZERO);
         let mut before = (place, rate);
         let mut at = Evaluated::default();
@@ -193,8 +193,8 @@ impl<F: Family> Path<F> {
                 travellers.iter_mut().enumerate().filter(|(_, traveller)| traveller.is_none())
             {
                 if let Some((start, pose)) = waiting.next() {
-                    *traveller = Some(Traveller::new(start));
-                    self.unspun(Place::of(pose)).put(&mut place, k);
+                    *traveller = Some(TrackedPath::new(start));
+                    self.unspun(PathPoint::of(pose)).put(&mut place, k);
                 }
             }
             if travellers.iter().all(Option::is_none) {
@@ -207,7 +207,7 @@ impl<F: Family> Path<F> {
                 let Some(who) = traveller else { continue };
                 let arrived = who.t >= 1.0 && at.size[k] <= CONVERGED && at.pivots[k] > FOLD_PIVOTS;
                 if !arrived && who.waits() {
-                    (ends[who.start], *traveller) = (self.end(who, &Place::get(&place, k)), None);
+                    (ends[who.start], *traveller) = (self.end(who, &PathPoint::get(&place, k)), None);
                     continue;
                 }
                 if who.contracts(at.size[k], self.precision) {
@@ -219,7 +219,8 @@ impl<F: Family> Path<F> {
                 }
                 who.h = who.h.min(1.0 - who.t);
                 if arrived {
-                    (ends[who.start], *traveller) = (End::Regular(Place::get(&place, k).pose()), None);
+                    (ends[who.start], *traveller) =
+                        (PathEnd::Regular(PathPoint::get(&place, k).pose()), None);
                 }
             }
             before.0.clone_from(&place);
@@ -233,12 +234,12 @@ impl<F: Family> Path<F> {
                 if who.judge(at.size[k], self.precision) {
                     copy(&next, &mut place, k);
                 }
-                let here = Place::get(&place, k);
+                let here = PathPoint::get(&place, k);
                 if self.family.spins() {
                     self.unspun(here).put(&mut place, k);
                 }
                 if !(here.size(self.family.mech()) < INFINITE) {
-                    (ends[who.start], *traveller) = (End::Infinite, None);
+                    (ends[who.start], *traveller) = (PathEnd::Infinite, None);
                 } else if who.t < 1.0 && who.h <= SMALLEST_STEP {
                     (ends[who.start], *traveller) = (self.end(who, &here), None);
                 }
@@ -246,7 +247,7 @@ impl<F: Family> Path<F> {
         }
     }
 
-    fn unspun(&self, place: Place<C>) -> Place<C> {
+    fn unspun(&self, place: PathPoint<C>) -> PathPoint<C> {
         if self.family.spins() { place.unspun(self.family.mech()) } else { place }
     }
 
@@ -269,11 +270,11 @@ impl<F: Family> Path<F> {
     }
 
     /// What the path comes to where it cannot be followed further, or paths seem to meet.
-    fn end(&self, who: &Traveller, place: &Place<C>) -> End {
+    fn end(&self, who: &TrackedPath, place: &PathPoint<C>) -> PathEnd {
         let mech = self.family.mech();
         let size = place.size(mech);
         if who.t < 1.0 - NEAR_END {
-            return if size > FAR { End::Infinite } else { End::Lost };
+            return if size > FAR { PathEnd::Infinite } else { PathEnd::Lost };
         }
         let (mut place, mut last) = (*place, f64::NAN);
         for _ in 0..LAST_STEPS {
@@ -289,7 +290,7 @@ impl<F: Family> Path<F> {
         let (System { residual, matrix }, _) = self.family.at(&place, 1.0);
         let determined = size > NEARBY || solve(matrix, residual).pivots > FOLD_PIVOTS;
         let regular = who.t >= 1.0 && last <= CONVERGED && determined;
-        if regular { End::Regular(place.pose()) } else { End::Singular(place.pose()) }
+        if regular { PathEnd::Regular(place.pose()) } else { PathEnd::Singular(place.pose()) }
     }
 
     /// Newton steps and rates at places.
@@ -300,12 +301,12 @@ impl<F: Family> Path<F> {
 
 /// A complex pose with its rotation as a quaternion of any size but zero, so that steps are sums \[T29\].
 #[derive(Clone, Copy, Debug)]
-pub struct Place<T> {
+pub struct PathPoint<T> {
     pub q: [T; 4],
     pub o: Vec3<T>,
 }
 
-impl<T: Real> Place<T> {
+impl<T: Real> PathPoint<T> {
     #[must_use]
     #[inline(always)]
     pub fn pose(&self) -> Pose<T> {
@@ -331,18 +332,18 @@ impl<T: Real> Place<T> {
         let (omega, vector) = (Vec3::new(x[3], x[4], x[5]).scale(0.5), Vec3::new(i, j, k));
         let turned = omega * w + omega.cross(vector);
         let o = Vec3::new(x[0], x[1], x[2]).scale(mech.characteristic_length);
-        Place { q: [-omega.dot(vector), turned.x, turned.y, turned.z], o }
+        PathPoint { q: [-omega.dot(vector), turned.x, turned.y, turned.z], o }
     }
 }
 
-impl<T: Real> std::ops::Add for Place<T> {
+impl<T: Real> std::ops::Add for PathPoint<T> {
     type Output = Self;
     fn add(self, b: Self) -> Self {
-        Place { q: std::array::from_fn(|i| self.q[i] + b.q[i]), o: self.o + b.o }
+        PathPoint { q: std::array::from_fn(|i| self.q[i] + b.q[i]), o: self.o + b.o }
     }
 }
 
-impl Place<C> {
+impl PathPoint<C> {
     /// From the largest of four products of the quaternion with each of its parts.
     pub(crate) fn of(pose: &Pose<C>) -> Self {
         let m = pose.rotation.rows();
@@ -355,7 +356,7 @@ impl Place<C> {
         let largest =
             (0..4).fold(0, |a, b| if products[b][b].norm() > products[a][a].norm() { b } else { a });
         let share = one / products[largest][largest].sqrt();
-        Place { q: products[largest].map(|p| p * share), o: pose.o }
+        PathPoint { q: products[largest].map(|p| p * share), o: pose.o }
     }
 
     /// The place after that imaginary idle spin which makes the quaternion least: spins are no part of a solution, and
@@ -378,13 +379,13 @@ impl Place<C> {
         let [first, second] = parts;
         let q = std::array::from_fn(|k| first[k].scale(share) + second[k].scale(1.0 / share));
         // The line stays where it is: o turns about it.
-        let (before, after) = (self.pose(), Place { q, ..self }.pose());
+        let (before, after) = (self.pose(), PathPoint { q, ..self }.pose());
         let point = Vec3::lift(idle.point);
         let o = match idle.side {
             Axes::Platform => self.o + before.rotation * point - after.rotation * point,
             Axes::Base => point - after.rotation * before.rotation.transpose_mul(point - self.o),
         };
-        Place { q, o }
+        PathPoint { q, o }
     }
 
     /// How large its coordinates are, as a pure number: of o, and of the rotation, by |q|²/|q·q|.
@@ -396,7 +397,7 @@ impl Place<C> {
 
     fn get(block: &Block, k: usize) -> Self {
         let [w, x, y, z, a, b, c] = std::array::from_fn(|i| C::new(block[2 * i][k], block[2 * i + 1][k]));
-        Place { q: [w, x, y, z], o: Vec3::new(a, b, c) }
+        PathPoint { q: [w, x, y, z], o: Vec3::new(a, b, c) }
     }
 
     fn put(&self, block: &mut Block, k: usize) {
@@ -409,7 +410,7 @@ impl Place<C> {
 
 /// The size of a step (v/Λ, ω), relative to how far off o is.
 #[inline(always)]
-fn step_size<T: Ordered>(mech: &Mechanism, place: &Place<Complex<T>>, x: &[Complex<T>; 6]) -> T {
+fn step_size<T: Ordered>(mech: &Mechanism, place: &PathPoint<Complex<T>>, x: &[Complex<T>; 6]) -> T {
     let mut sum = T::zero();
     for z in x {
         sum = sum + z.norm_sqr();
@@ -430,7 +431,7 @@ type Block = [Row; 14];
 const ZERO: Block = [[0.0; WIDTH]; 14];
 const ONE: Row = [1.0; WIDTH];
 
-fn row(travellers: &[Option<Traveller>; WIDTH], part: impl Fn(&Traveller) -> f64) -> Row {
+fn row(travellers: &[Option<TrackedPath>; WIDTH], part: impl Fn(&TrackedPath) -> f64) -> Row {
     std::array::from_fn(|k| travellers[k].as_ref().map_or(0.0, &part))
 }
 
@@ -480,7 +481,7 @@ impl<F: Family> Task for Evaluation<'_, F> {
         let mech = self.family.mech();
         let mut k = 0;
         while k < WIDTH {
-            let place: Place<Complex<V>> = load(self.place, k);
+            let place: PathPoint<Complex<V>> = load(self.place, k);
             let (System { mut residual, matrix }, rates) = self.family.at(&place, V::load(&self.t[k..]));
             for f in &mut residual {
                 *f = -*f;
@@ -507,17 +508,17 @@ fn between<V: Lanes>(from: C, to: C, t: V) -> (Complex<V>, Complex<V>) {
 }
 
 #[inline(always)]
-fn load<V: Lanes>(block: &Block, k: usize) -> Place<Complex<V>> {
+fn load<V: Lanes>(block: &Block, k: usize) -> PathPoint<Complex<V>> {
     let mut parts = [Complex::<V>::zero(); 7];
     for i in 0..7 {
         parts[i] = Complex::new(V::load(&block[2 * i][k..]), V::load(&block[2 * i + 1][k..]));
     }
     let [w, x, y, z, a, b, c] = parts;
-    Place { q: [w, x, y, z], o: Vec3::new(a, b, c) }
+    PathPoint { q: [w, x, y, z], o: Vec3::new(a, b, c) }
 }
 
 #[inline(always)]
-fn store<V: Lanes>(place: &Place<Complex<V>>, block: &mut Block, k: usize) {
+fn store<V: Lanes>(place: &PathPoint<Complex<V>>, block: &mut Block, k: usize) {
     let ([w, x, y, z], [a, b, c]) = (place.q, place.o.array());
     let parts = [w, x, y, z, a, b, c];
     for i in 0..7 {
@@ -533,7 +534,7 @@ mod tests {
     use super::*;
     use crate::common;
     use crate::number::lanes::tests::on_each_width;
-    use crate::numerics::random::Draw;
+    use crate::numerics::random::Random;
 
     #[derive(Clone, Copy)]
     struct Each<'a> {
@@ -552,18 +553,19 @@ mod tests {
         }
     }
 
-    fn complex_places(draw: &mut Draw) -> [Place<C>; WIDTH] {
+    fn complex_places(draw: &mut Random) -> [PathPoint<C>; WIDTH] {
         let mut place =
-            || Place { q: std::array::from_fn(|_| draw.complex()), o: draw.vector(Draw::complex) };
+            || PathPoint { q: std::array::from_fn(|_| draw.complex()), o: draw.vector(Random::complex) };
         std::array::from_fn(|_| place())
     }
 
     #[test]
     fn paths_side_by_side_are_those_alone_bit_by_bit() {
-        let mut draw = Draw(5);
+        let mut draw = Random(5);
         for mech in common::mechanisms() {
-            let [from, to] = [(); 2]
-                .map(|()| std::array::from_fn(|_| Asked { place: draw.complex(), square: draw.complex() }));
+            let [from, to] = [(); 2].map(|()| {
+                std::array::from_fn(|_| LegTarget { place: draw.complex(), square: draw.complex() })
+            });
             let family = Lengths { mech: &mech, from, to };
             let (places, mut block) = (complex_places(&mut draw), ZERO);
             for (k, place) in places.iter().enumerate() {
@@ -584,14 +586,14 @@ mod tests {
             let all: Vec<Evaluated> = all.into_iter().map(|(_, result)| result).collect();
             // Lane 3 is what the equations of that place alone say.
             let at = |a: C, b: C| a + (b - a).scale(t[3]);
-            let asked = std::array::from_fn(|i| Asked {
+            let asked = std::array::from_fn(|i| LegTarget {
                 place: at(from[i].place, to[i].place),
                 square: at(from[i].square, to[i].square),
             });
             let System { residual, matrix } = system(&mech, &places[3].pose(), &asked);
             let step = solve(matrix, residual.map(|f| -f)).x;
             let correction = places[3].along(&mech, &step);
-            let found = Place::get(&all[0].correction, 3);
+            let found = PathPoint::get(&all[0].correction, 3);
             let error = found.q.iter().zip(correction.q).map(|(&a, b)| (a - b).norm()).fold(0.0, f64::max);
             assert!(
                 error < 1e-9 * correction.q.iter().map(|q| q.norm()).fold(1.0, f64::max),
@@ -603,9 +605,9 @@ mod tests {
 
     #[test]
     fn a_quaternion_of_any_size_is_its_rotation() {
-        for place in complex_places(&mut Draw(11)) {
+        for place in complex_places(&mut Random(11)) {
             let pose = place.pose();
-            let again = Place::of(&pose).pose();
+            let again = PathPoint::of(&pose).pose();
             for (a, b) in pose.rotation.0.into_iter().zip(again.rotation.0) {
                 assert!(modulus(a - b) < 1e-12 * (1.0 + modulus(a)));
             }
@@ -614,7 +616,7 @@ mod tests {
         }
         // Unit quaternion of a turn by 0.6 about z, twice as large.
         let (s, c) = 0.3_f64.sin_cos();
-        let place = Place { q: [2.0 * c, 0.0, 0.0, 2.0 * s].map(C::lit), o: Vec3::zero() };
+        let place = PathPoint { q: [2.0 * c, 0.0, 0.0, 2.0 * s].map(C::lit), o: Vec3::zero() };
         let turned = Mat3::from_rotation_vector(Vec3::Z * 0.6);
         for (a, b) in place.pose().rotation.0.into_iter().zip(turned.0) {
             assert!(modulus(a - Vec3::lift(b)) < 1e-15);
@@ -624,13 +626,13 @@ mod tests {
     #[test]
     fn the_rate_of_a_place_is_that_of_its_pose() {
         let mech = common::published();
-        let mut draw = Draw(3);
+        let mut draw = Random(3);
         let [place, ..] = complex_places(&mut draw);
         let twist: [C; 6] = std::array::from_fn(|_| draw.complex());
         let rate = place.along(&mech, &twist);
         let h = 1e-6;
         let moved = |h: f64| {
-            let step = Place { q: rate.q.map(|q| q.scale(h)), o: rate.o.scale(h) };
+            let step = PathPoint { q: rate.q.map(|q| q.scale(h)), o: rate.o.scale(h) };
             (place + step).pose()
         };
         let omega = Vec3::new(twist[3], twist[4], twist[5]);

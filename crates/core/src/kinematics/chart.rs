@@ -33,7 +33,7 @@ pub struct Chart {
 
 /// A pose of the chart, with what its rates need.
 #[derive(Clone, Copy, Debug)]
-pub struct Place {
+pub struct ChartPoint {
     pub pose: Pose<f64>,
     pub twist: Twist<f64>,
     /// Vector of the Cayley map from the chart's own pose.
@@ -117,7 +117,7 @@ impl Chart {
 
     /// The pose at θ and the twist of the rates θ'; none where the chart ends.
     #[must_use]
-    pub fn place(&self, mech: &Mechanism, theta: &[f64], rates: &[f64]) -> Option<Place> {
+    pub fn place(&self, mech: &Mechanism, theta: &[f64], rates: &[f64]) -> Option<ChartPoint> {
         let along = self.sum(0, theta);
         let mut nu = [0.0; MAX_CONSTRAINTS];
         let count = mech.independent.len();
@@ -152,7 +152,7 @@ impl Chart {
         let back = self.across(mech, &pose, turn, |_, row| -row.power(&forward)).x;
         let aside = self.moved(turn, &self.sum(self.freedoms, &back[..count]));
         let twist = Twist::new(forward.v + aside.v, forward.omega + aside.omega);
-        Some(Place { pose, twist, turn })
+        Some(ChartPoint { pose, twist, turn })
     }
 
     fn stepped(&self, along: &[f64; 6], nu: &[f64]) -> (Pose<f64>, Vec3<f64>) {
@@ -169,7 +169,7 @@ impl Chart {
 
     /// θ'' of an acceleration at a place: with `w' = ω - ½ w×ω + ¼ w (w·ω)`, differentiated once.
     #[must_use]
-    pub fn second_rates(&self, place: &Place, acceleration: &Acceleration<f64>) -> Vec<f64> {
+    pub fn second_rates(&self, place: &ChartPoint, acceleration: &Acceleration<f64>) -> Vec<f64> {
         let (w, omega, eps) = (place.turn, place.twist.omega, acceleration.eps);
         let w1 = omega - w.cross(omega) * 0.5 + w * (0.25 * w.dot(omega));
         let w2 = eps - (w1.cross(omega) + w.cross(eps)) * 0.5

@@ -38,7 +38,7 @@ impl<T: Real> Frame<T> {
 
 /// How the platform end moves, and with it the leg's coordinate and direction \[T2\]-\[T4\] \[T68\].
 #[derive(Clone, Copy, Debug)]
-pub struct End<T> {
+pub struct EndMotion<T> {
     /// Base axes.
     pub v_b: Vec3<T>,
     pub a_b: Vec3<T>,
@@ -53,7 +53,7 @@ pub struct End<T> {
 
 /// How the leg turns \[T6\].
 #[derive(Clone, Copy, Debug)]
-pub struct Turn<T> {
+pub struct LegRotation<T> {
     pub spin: T,
     pub spin_rate: T,
     /// Angular velocity and acceleration along n, δ, m.
@@ -63,14 +63,14 @@ pub struct Turn<T> {
 
 /// All of a leg at an instant.
 #[derive(Clone, Copy, Debug)]
-pub struct State<T> {
+pub struct LegState<T> {
     pub position: Position<T>,
-    pub end: End<T>,
+    pub end: EndMotion<T>,
     pub frame: Frame<T>,
-    pub turn: Turn<T>,
+    pub turn: LegRotation<T>,
 }
 
-impl<T: Real> State<T> {
+impl<T: Real> LegState<T> {
     /// Angular velocity, base axes.
     #[inline(always)]
     pub fn omega(&self) -> Vec3<T> {
@@ -91,7 +91,7 @@ impl<T: Real> State<T> {
         velocity: Vec3<T>,
         acceleration: Vec3<T>,
     ) -> PointMotion<T> {
-        let (axes, Turn { omega, eps, .. }, center) = (self.frame.axes, self.turn, Vec3::lift(center));
+        let (axes, LegRotation { omega, eps, .. }, center) = (self.frame.axes, self.turn, Vec3::lift(center));
         let spin = omega.cross(center);
         PointMotion {
             offset: axes * center,

@@ -3,7 +3,7 @@
 //! At the base they are those of the leg against the base, at the platform those of the platform against the leg, so
 //! that `ω = ω_leg + φ_1' u + φ_2' n` [Eq. 29].
 
-use crate::kinematics::leg::{self, State};
+use crate::kinematics::leg::{self, LegState};
 use crate::model::joint::Joint;
 use crate::model::limit::Zero;
 use crate::model::mechanism::{Leg, Mechanism};
@@ -36,7 +36,7 @@ pub fn angles<T: Trig>(
     leg: &Leg,
     zero: &Zero,
     platform: &Motion<T>,
-    state: &State<T>,
+    state: &LegState<T>,
 ) -> [JointAngles<T>; 2] {
     let (n, delta, omega) = (state.frame.n(), state.position.delta, state.omega());
     let rotation = &platform.pose.rotation;

@@ -174,7 +174,7 @@ impl Cubic {
 
 /// What a search along a path found.
 #[derive(Clone, Copy, Debug)]
-pub struct Found {
+pub struct FoundRoots {
     /// The first zero, if there is one.
     pub zero: Option<f64>,
     /// How far the path was followed: to the reach, or to where the function ends.
@@ -190,10 +190,10 @@ pub fn first_zero(
     mut touches: impl FnMut(f64) -> bool,
     step: f64,
     reach: f64,
-) -> Found {
-    let Some(mut from) = at(0.0) else { return Found { zero: None, end: 0.0 } };
+) -> FoundRoots {
+    let Some(mut from) = at(0.0) else { return FoundRoots { zero: None, end: 0.0 } };
     if touches(0.0) {
-        return Found { zero: Some(0.0), end: 0.0 };
+        return FoundRoots { zero: Some(0.0), end: 0.0 };
     }
     let mut stride = step;
     while from.t < reach {
@@ -207,11 +207,11 @@ pub fn first_zero(
             continue;
         };
         if let Some(zero) = zero_within(&mut at, &mut touches, from, to) {
-            return Found { zero: Some(zero), end: zero };
+            return FoundRoots { zero: Some(zero), end: zero };
         }
         from = to;
     }
-    Found { zero: None, end: from.t }
+    FoundRoots { zero: None, end: from.t }
 }
 
 /// The first zero of one step: the function is evaluated where the cubics have events until these stay where they are.

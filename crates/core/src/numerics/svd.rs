@@ -85,7 +85,7 @@ fn rotate(m: &mut DMatrix<f64>, i: usize, j: usize, cos: f64, sin: f64) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::numerics::random::Draw;
+    use crate::numerics::random::Random;
 
     fn check(m: &DMatrix<f64>) -> Svd {
         let svd = Svd::of(m).unwrap();
@@ -99,13 +99,13 @@ mod tests {
         svd
     }
 
-    fn random(rows: usize, columns: usize, draw: &mut Draw) -> DMatrix<f64> {
+    fn random(rows: usize, columns: usize, draw: &mut Random) -> DMatrix<f64> {
         DMatrix::from_fn(rows, columns, |_, _| draw.number())
     }
 
     #[test]
     fn values_are_those_that_the_matrix_was_made_of() {
-        let mut draw = Draw(7);
+        let mut draw = Random(7);
         for (rows, columns) in [(6, 6), (9, 4), (24, 24), (3, 6)] {
             let least = rows.min(columns);
             let (left, right) =
@@ -127,7 +127,7 @@ mod tests {
 
     #[test]
     fn equal_values_zeros_and_nothing_at_all() {
-        let mut draw = Draw(8);
+        let mut draw = Random(8);
         assert_eq!(check(&DMatrix::identity(6, 6)).values, DVector::from_element(6, 1.0));
         assert_eq!(check_of_zero(&DMatrix::zeros(6, 6)), DVector::zeros(6));
         let twice = random(6, 3, &mut draw);

@@ -1,10 +1,10 @@
 //! Steps from poses to other lengths, many side by side in lanes \[T41\], \[T65\]: where each leads to first order, and
 //! the way itself, followed to its end.
 
-use crate::forward_kinematics::newton::{Asked, step_of, system};
-use crate::forward_kinematics::newton_lanes::{ARRIVED, BEGINNING, GOING, Newton, Piece, Pieces, newton};
+use crate::forward_kinematics::newton::{LegTarget, step_of, system};
+use crate::forward_kinematics::newton_lanes::{ARRIVED, BEGINNING, GOING, NewtonStep, Piece, Pieces, newton};
 use crate::kinematics::leg;
-use crate::limits::margins::Seen;
+use crate::limits::margins::LegCache;
 use crate::model::limit::Limit;
 use crate::model::mechanism::Mechanism;
 use crate::model::status::Status;
@@ -64,7 +64,7 @@ impl Room<'_> {
             let ahead = leg::ahead(self.mech, direction, pose);
             inside = V::select(ahead.greater(V::zero()), inside, V::zero());
         }
-        let mut seen = Seen::default();
+        let mut seen = LegCache::default();
         for limit in &self.mech.limits {
             if is_of_joint(limit) {
                 let margin = limit.bound.margin(limit.of_joint(self.mech, pose, &mut seen));
@@ -144,7 +144,7 @@ impl Task for Prediction<'_> {
                 unit[i][i] = V::one();
             }
             // One elimination for all directions: only one length changes in each.
-            let columns = solve_all(system(mech, &pose, &[Asked::none(); 6]).matrix, unit).x;
+            let columns = solve_all(system(mech, &pose, &[LegTarget::none(); 6]).matrix, unit).x;
             let arm = pose.rotation * Vec3::<V>::lift(MARKER * scale);
             for axis in 0..axes {
                 for direction in 0..2 {
@@ -396,7 +396,7 @@ impl Task for Advance<'_> {
         let mut k = 0;
         while k < WIDTH {
             let pose: Pose<V> = load(self.poses, k);
-            let Newton { next, size, sign, .. } = newton(self.mech, &pose, self.ahead, k);
+            let NewtonStep { next, size, sign, .. } = newton(self.mech, &pose, self.ahead, k);
             let mut piece = Piece::load(self.pieces, k);
             let (course, made) = piece.judge(size, sign);
             store(&chosen(made, &next, &pose), self.poses, k);

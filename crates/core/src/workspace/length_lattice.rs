@@ -444,7 +444,7 @@ impl Lattice {
 mod tests {
     use super::*;
     use crate::common::published;
-    use crate::forward_kinematics::newton::{Asked, continuation, size, step_of, system};
+    use crate::forward_kinematics::newton::{LegTarget, continuation, size, step_of, system};
     use crate::kinematics::coordinate_sets::Set;
     use crate::model::limit::Limit;
     use crate::model::spec::Axes;
@@ -491,7 +491,7 @@ mod tests {
                 if from[k] == to[k] { to[k] } else { (1.0 - goal) * from[k] + goal * to[k] }
             });
             let ahead: [f64; 6] = ahead;
-            let asked = ahead.map(|square| Asked { place: 0.0, square });
+            let asked = ahead.map(|square| LegTarget { place: 0.0, square });
             let found = continuation(mech, &asked, &pose, 1.0).0;
             let inside = |pose: &Pose<f64>| {
                 let o = pose.o.array();
@@ -576,7 +576,7 @@ mod tests {
                 let at = system(
                     &mech,
                     pose,
-                    &lattice.squares(step.node).map(|square| Asked { place: 0.0, square }),
+                    &lattice.squares(step.node).map(|square| LegTarget { place: 0.0, square }),
                 );
                 let x = solve(at.matrix, at.residual.map(|f| -f)).x;
                 let next = pose.stepped(&step_of(&mech, x, 1.0));
