@@ -380,6 +380,16 @@ def test_two_crossings_between_samples_of_one_sign_are_found(n):
         assert len({*np.sign(solution.dataset.determinant.values)}) == 1, "the samples do not show it"
 
 
+@pytest.mark.parametrize("n", [3, 8, 101])
+@pytest.mark.parametrize("half", [2e-3, 5e-5])
+def test_two_crossings_shortly_after_one_another_are_two(n, half):
+    """Far nearer to each other than samples are, but farther than rounding could part one that is touched."""
+    solution = pp.solve(GOUGH, yaw(lambda t: np.pi / 2 + half**2 - (t - 0.45) ** 2, n))
+    found = solution.singularities["crossings"]
+    assert [c["time"] for c in found] == pytest.approx([0.45 - half, 0.45 + half], abs=1e-8)
+    assert all(c["crosses"] and c["found"] for c in found)
+
+
 @pytest.mark.parametrize("n", [3, 4, 8, 101])
 @pytest.mark.parametrize(("margin", "touches"), [(0.0, True), (1e-4, False)])
 def test_a_touched_singularity_is_found_and_a_near_miss_is_none(n, margin, touches):
