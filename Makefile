@@ -82,7 +82,7 @@ lock: $(DEPS) ## renew requirements.lock and Cargo.lock
 	cargo update
 
 clean: ## remove whatever these targets made
-	rm -rf $(VENV) build demo dist site target .hypothesis .mypy_cache .pytest_cache .ruff_cache
+	rm -rf $(VENV) build demo dist site target .mypy_cache .pytest_cache .ruff_cache
 	rm -f python/polypod/_core*.so python/polypod/_core*.pyd
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
