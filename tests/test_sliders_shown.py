@@ -11,8 +11,9 @@ import pytest
 import polypod as pp
 from polypod.answers import leg_words
 from polypod.bodies.links import link_frames, links_of
-from polypod.plots import _topology_places, fig4_panels
+from polypod.plots import fig4_panels
 from polypod.plots.scene import Scene
+from polypod.plots.topology import _topology_places
 from polypod.report.data import data_tables
 from polypod.report.words import actuators_table
 from polypod.summary.mechanism_facts import describe
