@@ -55,6 +55,7 @@ test-rust: $(BUILT)
 lint: $(BUILT) ## formatting, style and types of both languages
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
+	$(BIN)/python tools/imports.py
 	$(BIN)/mypy
 	$(BIN)/python -m mypy.stubtest --mypy-config-file pyproject.toml polypod._core
 	cargo fmt --all --check

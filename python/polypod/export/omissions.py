@@ -11,7 +11,7 @@ STROKES = frozenset({"stroke min", "stroke max"})
 TURNS = frozenset({"base angle", "rod angle"})
 PLATFORM_TURNS = frozenset({"platform angle"})
 FORCES = frozenset({"force min", "force max"})
-"""Kinds of limits, as in `polypod.answers.kinematics.Limit`, that a format may carry."""
+"""Kinds of limits, as in `polypod.answers.parts.Limit`, that a format may carry."""
 
 
 def lost(model: Model, limits: Collection[str], *, gravity: bool) -> list[str]:
