@@ -204,7 +204,7 @@ def test_conditioning(name):
 
 
 def test_legs_on_one_rod_keep_the_angle_between_their_planes():
-    """Legs whose planes through their rod differ are tied by it: one freedom less than two UPU legs leave.
+    """A rod ties legs in different planes through it: one degree of freedom less than two UPU legs leave.
 
     The rod carries both revolute joints, so that the angle between their axes stays. Where both platform axes
     lie on one line, as in the paper, the angle stays anyway; elsewhere one of four actuators is redundant.

@@ -118,7 +118,7 @@ def test_struts_may_reach_their_rails_near_home_alone() -> None:
 
 @pytest.mark.parametrize("number", [14273, 15988])
 def test_mobility_is_that_of_the_mode_of_home(number: int) -> None:
-    """Others have fewer freedoms (14273), or a leg without length (15988)."""
+    """Others have fewer degrees of freedom (14273), or a leg without length (15988)."""
     drawn = draw(number)
     assert freedoms(drawn) == Mobility.of(drawn).dof
 
@@ -132,13 +132,13 @@ def test_legs_on_a_rod_may_end_in_one_point() -> None:
 
 
 def test_a_mechanism_with_idle_freedoms_alone_is_refused() -> None:
-    """Three RPS legs to one point: it turns about the point, and no leg moves it."""
+    """Three RPS legs to one point: it rotates about the point, and no leg moves it."""
     legs = [
         {"base": {"joint": "R", "point": point, "axis": axis}, "platform": {"joint": "S", "point": [0, 0, 0]}}
         for point, axis in (([6, 0, 0], [0, 1, 0]), ([-3, 5, 0], [5, 3, 0]), ([-3, -5, 0], [1, 1, -0.8]))
     ]
     data = {"name": "ball", "units": {"length": "m"}, "home": {"position": [0, 0, 10]}, "legs": legs}
-    with pytest.raises(pp.MechanismError, match="all 3 freedoms of the platform are idle"):
+    with pytest.raises(pp.MechanismError, match="all 3 degrees of freedom of the platform are idle"):
         pp.Mechanism.from_dict(data)
 
 
@@ -166,7 +166,7 @@ def test_many_mechanisms(batch: int, first: int) -> None:
     ],
 )
 def test_screws_give_the_freedoms_of_the_catalogue(name: str, dof: int, passive: int) -> None:
-    """The numpy side by itself, on mechanisms whose freedoms are known."""
+    """The numpy side by itself, on mechanisms whose degrees of freedom are known."""
     found = Mobility.of(of_geometry(pp.load(name).geometry))
     assert (found.dof, found.passive, found.idle) == (dof, passive, 0)
 

@@ -286,7 +286,7 @@ def test_eq34a():
 
 
 def test_eq34b():
-    """d'_i1 and d'_i2 are what turns Eq. 34a into the product's angular acceleration."""
+    """d'_i1 and d'_i2 are what rotates Eq. 34a into the product's angular acceleration."""
 
     def eps(m):
         R1, R2 = o.eq33_axes(m)

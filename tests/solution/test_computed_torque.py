@@ -10,7 +10,7 @@ from support import DATA
 
 
 def scaled(mech, factor):
-    """The same mechanism with all masses and inertias times a factor."""
+    """The mechanism with all masses and inertias times a factor."""
     content = mech.to_dict()
     bodies = [content["platform"], *content.get("rods", ())]
     bodies += [leg[part] for leg in content["legs"] for part in ("cylinder", "piston") if part in leg]

@@ -40,21 +40,21 @@ FORCES = 1e-9
 """Relative to the largest force: rounding, magnified by singular values and redundant closures."""
 LOAD = np.array([300.0, -200.0, -500.0, 20.0, 40.0, -30.0])
 UNCLEAR = "no clear rank"
-"""Of these the freedoms alone are compared; there are not many."""
+"""Of these the degrees of freedom alone are compared; there are not many."""
 MISFIT = "joints or struts do not fit the rail"
 LINE = 1e-8
-"""Share of a turn about an idle line that a leg may feel: rounding of ranks."""
+"""Share of a rotation about an idle line that a leg may feel: rounding of ranks."""
 LENGTHS = 1e-10
 """Relative to the longest leg: loops are closed to 1e-13, nearly singular ones magnify that."""
 REGULAR = 1e-3
 """Least singular value, above which forward kinematics must come back."""
 TWIN_REGULAR = 0.02
-"""The same for forces: rounding grows with its inverse."""
+"""Least singular value, above which forces must agree: rounding grows with its inverse."""
 
 
 @dataclass
 class Outcome:
-    """What became of one mechanism."""
+    """Outcome of one mechanism."""
 
     number: int
     kinds: tuple[str, ...]
@@ -93,7 +93,7 @@ def examine(number: int) -> Outcome:
         return out
     found = mech.mobility()
     out.idle, out.redundant = len(found.idle), mech.redundantly_actuated
-    # What actuators do not hold, by screws: idle freedoms too.
+    # What actuators do not hold, by screws: local degrees of freedom too.
     left = found.uncontrolled + out.idle
     theirs = Mobility(found.dof, found.passive, found.closure_rank, left, out.idle)
     if theirs != own:
@@ -103,7 +103,9 @@ def examine(number: int) -> Outcome:
     if found.redundant != 6 * (len(drawn.legs) - 1) - own.closure_rank or found.joint_freedoms != sum(
         (len(leg.screws) for leg in drawn.legs), len(drawn.rods)
     ):
-        out.wrong.append(f"{found.redundant} redundant closures, {found.joint_freedoms} freedoms of joints")
+        out.wrong.append(
+            f"{found.redundant} redundant closures, {found.joint_freedoms} degrees of freedom of joints"
+        )
     lines(mech, drawn, out)
     kinematics(mech, drawn, out)
     power(mech, drawn, out)
@@ -117,12 +119,12 @@ def freedoms(drawn: Drawn) -> int:
     try:
         return pp.Mechanism.from_dict(drawn.data).dof
     except pp.MechanismError as error:
-        said = re.search(r"(?:for|leave|all) (\d+) freedoms|(one) freedom", str(error))
+        said = re.search(r"(?:for|leave|all) (\d+) degrees of freedom|(one) degree of freedom", str(error))
         return int(said[1] or 1) if said else 0
 
 
 def faulty(drawn: Drawn) -> tuple[str, list[str]]:
-    """What a mechanism with legs that no loader may take is refused for."""
+    """Reason for which a mechanism with impossible legs is refused."""
     try:
         pp.Mechanism.from_dict(drawn.data)
     except pp.MechanismError as error:
@@ -132,7 +134,7 @@ def faulty(drawn: Drawn) -> tuple[str, list[str]]:
 
 
 def lines(mech: pp.Mechanism, drawn: Drawn, out: Outcome) -> None:
-    """Turns about the lines of idle freedoms are among the twists that no leg feels, at poses near home."""
+    """Rotations about lines of local degrees of freedom are twists that no leg feels, at poses near home."""
     for line in mech.mobility().idle:
         axis, point = np.array(line.axis), np.array(line.point)
         if line.body == "platform":
@@ -141,28 +143,28 @@ def lines(mech: pp.Mechanism, drawn: Drawn, out: Outcome) -> None:
         for end, twists in unfelt(drawn):
             now = by(end, turn) if line.body == "platform" else turn
             if not abs(now - twists @ (twists.T @ now)).max() < LINE:
-                out.wrong.append(f"legs feel the turn about the idle line {line}")
+                out.wrong.append(f"legs feel the rotation about the idle line {line}")
 
 
 def shaky(drawn: Drawn) -> list[str]:
-    """What is wrong with the freedoms of a mechanism whose ranks are not clear."""
+    """Faults in the degrees of freedom of a mechanism whose ranks are not clear."""
     dof, found = extent(drawn), freedoms(drawn)
-    return [] if found == dof else [f"{found} freedoms, but poses in {dof} directions"]
+    return [] if found == dof else [f"{found} degrees of freedom, but poses in {dof} directions"]
 
 
 def refusal(error: pp.MechanismError, own: Mobility, actuators: int) -> tuple[str, list[str]]:
     """The reason without its numbers, and what is wrong with it."""
     fault, *others = error.faults
     reason = re.sub(r"\d+", "n", fault.message.split(";")[0])
-    said = re.match(r"(\d+) actuated legs for (\d+) freedoms.*; at least (\d+) legs", fault.message)
+    said = re.match(r"(\d+) actuated legs for (\d+) degrees of freedom.*; at least (\d+) legs", fault.message)
     if said:
-        # Fewer are needed where freedoms are idle.
+        # Fewer are needed where degrees of freedom are idle.
         needed = own.dof - own.idle
         right = [int(n) for n in said.groups()] == [actuators, own.dof, needed] and actuators < needed
     elif "idle, so that no leg moves it" in fault.message:
         right = own.dof == own.idle > 0
     else:
-        right = "leave the platform no freedom" in fault.message and own.dof == 0
+        right = "leave the platform no degree of freedom" in fault.message and own.dof == 0
     return reason, [] if right and not others else [
         f"refused: {fault}; by screws {own}, {actuators} actuators"
     ]
@@ -202,7 +204,7 @@ def kinematics(mech: pp.Mechanism, drawn: Drawn, out: Outcome) -> None:
     lengths = own + 2.0 * sign * np.minimum(lean, 0.0)
     size = abs(lengths).max(axis=1)
     found = mech.inverse_kinematics(poses)
-    # Where a strut is square to its rail, a place is known to the square root of rounding.
+    # Where a strut is perpendicular to its rail, a place is known to the square root of rounding.
     off = abs(found.lengths - lengths) * np.minimum(abs(lean), 1.0)
     out.lengths = float((off.max(axis=1) / size).max())
     if not out.lengths < LENGTHS:
@@ -295,7 +297,10 @@ def table(outcomes: list[Outcome]) -> str:
             *rows,
             "",
             *(f"{number} {reason}" for reason, number in reasons.items()),
-            *(f"{number} with (idle freedoms, redundant legs) {kind}" for kind, number in special.items()),
+            *(
+                f"{number} with (local degrees of freedom, redundant legs) {kind}"
+                for kind, number in special.items()
+            ),
         ]
     )
 

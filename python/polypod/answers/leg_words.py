@@ -11,12 +11,12 @@ def slides(letters: str) -> bool:
 
 
 def word(letters: Iterable[str]) -> str:
-    """What legs with these joints have: "length", "place", or "length or place"."""
+    """Word for the coordinate of legs with these joints: "length", "place", or "length or place"."""
     kinds = {slides(each) for each in letters}
     return "length or place" if len(kinds) > 1 else "place" if True in kinds else "length"
 
 
 def words(letters: Iterable[str]) -> str:
-    """The same of several: "leg lengths", "places", or "lengths and places"."""
+    """Plural of `word`: "leg lengths", "places", or "lengths and places"."""
     of = {"length": "leg lengths", "place": "places", "length or place": "lengths and places"}
     return of[word(letters)]

@@ -71,7 +71,8 @@ class LinkFrames(NamedTuple):
     frames: Array
     """(..., l, 4, 4): the link's axes and origin in base axes, m; NaN where a link has no place."""
     turn_known: NDArray[np.bool_]
-    """(..., l): False where the core does not tell the link's turn about its own line; any one stands then.
+    """(..., l): False where the core does not tell the link's rotation about its own line; any one stands
+    then.
 
     So at poses where balance determines no reactions, and where a leg lies along its universal joint's axis.
     """
@@ -99,7 +100,7 @@ def link_frames(mech: Mechanism, pose: ArrayLike) -> LinkFrames:
 
 
 class LinkPlaces:
-    """What `link_frames` tells, for those who ask again and again."""
+    """Frames of `link_frames`, computed once and kept."""
 
     def __init__(self, mech: Mechanism) -> None:
         self._mech, geometry = mech, mech.geometry
@@ -132,7 +133,7 @@ class LinkPlaces:
         frames[..., 1 : 1 + rods, :3, :3], turn_known[..., 1 : 1 + rods] = rod_axes, rod_known
         frames[..., 1 : 1 + rods, :3, 3] = self._rod_points
         turns = self._sliders[:, None, None]
-        # A carriage does not turn; a strut begins where a cylinder does.
+        # A carriage does not rotate; a strut begins where a cylinder does.
         for first, turned, origin in (
             (1 + rods, np.where(turns, np.eye(3), axes), starts),
             (2 + rods, axes, np.where(self._sliders[:, None], starts, starts + legs.vectors)),
@@ -361,7 +362,7 @@ class _Shapes:
 
 
 def leg_radii(mech: Mechanism) -> list[float]:
-    """What the struts are drawn with, m."""
+    """Radii with which the struts are drawn, m."""
     return [leg["radius"] or RADIUS * mech.characteristic_length for leg in mech.geometry["legs"]]
 
 
@@ -394,7 +395,7 @@ def _leg_sizes(stroke: Array, home: float, radius: float) -> _LegSizes:
 
 
 def _on_leg(joint: dict[str, Any], radius: float, at: ArrayLike = (0.0, 0.0, 0.0)) -> list[Piece]:
-    """What a joint has on the leg: the ball, or the pin along n."""
+    """Solid of a joint on the leg: the ball, or the pin along n."""
     match joint["joint"]:
         case "S":
             return [Piece("ball", JOINT, ball(at, 1.45 * radius))]

@@ -1,4 +1,4 @@
-"""What a mechanism file says and a format does not: nothing is left out without a word."""
+"""Contents of a mechanism file that a format cannot hold: nothing is left out without a word."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def lost(model: Model, limits: Collection[str], *, gravity: bool) -> list[str]:
     ]
     if carriages:
         notes.append(
-            "carriages, which do not turn, have no moment of inertia in the mechanism file; here they have "
+            "carriages, which do not rotate, have no moment of inertia in the mechanism file; here they have "
             f"those of a radius of gyration of {CARRIAGE:g} of their struts' lengths, of no effect: "
             f"{', '.join(carriages)}."
         )

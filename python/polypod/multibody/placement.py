@@ -1,7 +1,7 @@
 """Where the links of a mechanism are at a pose of the platform, from points and axes alone.
 
 A leg's frame is (n, δ, n×δ), as the mechanism file's format defines it; a rod's is (L, n, L×n). A carriage,
-which does not turn, has the base's. The origin is at the base joint, of a piston at the platform joint.
+which does not rotate, has the base's. The origin is at the base joint, of a piston at the platform joint.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ class Turning:
     axis: Array
     """(3,): unit vector in the axes of base or platform."""
     along: bool
-    """n is the axis itself (R, F), or square to it and to the leg (U)."""
+    """n is the axis itself (R, F), or perpendicular to it and to the leg (U)."""
 
 
 def leg_bodies(leg: Mapping[str, Any]) -> tuple[str, str]:
@@ -50,7 +50,7 @@ def rod_body(rod: Mapping[str, Any]) -> str:
 
 
 def turning_of(geometry: Mapping[str, Any], leg: Mapping[str, Any]) -> Turning | None:
-    """What keeps a leg from spinning: its base joint if that is U, R or F, else its platform joint."""
+    """Joint that keeps a leg from spinning: its base joint if that is U, R or F, else its platform joint."""
     if leg["base"]["rod"] is not None:
         return Turning("base", unit(geometry["rods"][leg["base"]["rod"]]["axis"]), along=False)
     sides: tuple[Literal["base", "platform"], ...] = ("base", "platform")

@@ -171,6 +171,6 @@ def _torque(data: xr.Dataset) -> Panel:
 
 
 def _word_of(data: xr.Dataset) -> str:
-    """What the prismatic joints have, see `word`; "length" where the dataset does not tell its mechanism."""
+    """Word for the coordinate of the prismatic joints; "length" where the dataset holds no mechanism."""
     text = data.attrs.get("mechanism_file")
     return word(Mechanism.from_toml(text).leg_letters) if text else "length"

@@ -1,4 +1,4 @@
-"""What a report says in words, and at a glance."""
+"""Texts of a report, and its overview."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from polypod.summary.tables import Table, fixed, outcome, range_mm, significant
 
 
 def warnings(content: Content) -> list[str]:
-    """Whatever a reader should know first: of the mechanism, of its motion, of limits and of lost states."""
+    """Warnings at the top: of the mechanism, of its motion, of limits and of lost states."""
     found = [_sentence(warning) for warning in content.facts["warnings"]]
     if content.along is None:
         return found
@@ -36,7 +36,7 @@ def lost(facts: dict[str, Any]) -> list[str]:
 
 
 def outcomes(facts: dict[str, Any]) -> str:
-    """What became of all states, in one sentence."""
+    """Outcomes of all states, in one sentence."""
     if not facts["outcomes"]:
         return outcome(facts)
     without, states = facts["without_answer"], facts["states"]
@@ -64,7 +64,7 @@ def glance(content: Content) -> list[tuple[str, str]]:
 
 
 def workspace_words(facts: dict[str, Any]) -> str:
-    """What the workspace is, in one sentence."""
+    """Description of the workspace, in one sentence."""
     if facts["kind"] == "reachable":
         return "All positions of o that can be reached inside all limits, whatever the orientation."
     *names, last = facts["extents"]
@@ -92,7 +92,7 @@ def _of_motion(along: Along) -> list[tuple[str, str]]:
 
 
 def actuators_table(rows: list[dict[str, Any]], letters: Sequence[str]) -> Table:
-    """What the motion asks of each actuator; `letters` are the joints of all legs."""
+    """Requirements of the motion on each actuator; `letters` are the joints of all legs."""
     cells = []
     for row in rows:
         force, speed, power, stroke = (row[key] for key in ("force", "speed", "power", "stroke"))

@@ -307,7 +307,7 @@ work! {
 }
 
 work! {
-    /// What a unit of the k-th parameter puts on the platform.
+    /// Wrench on the platform of a unit of the k-th parameter.
     UnitWrench<'a, V> {
         regressor: &'a Regressor,
         mech: &'a Mechanism,
