@@ -1,6 +1,4 @@
-"""Mobility: degrees of freedom, redundant constraints and passive degrees of freedom, and the topology graph
-[Eq. 1, T18].
-"""
+"""Mobility: degrees of freedom, redundant constraints, and the topology graph [Eq. 1, T18]."""
 
 from __future__ import annotations
 
