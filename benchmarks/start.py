@@ -37,7 +37,16 @@ def build():
     """Seconds of the extension's build from nothing, with all that it depends on but downloads."""
     subprocess.run(["cargo", "fetch", "--locked"], cwd=ROOT, check=True)
     with tempfile.TemporaryDirectory() as target:
-        command = ["cargo", "build", "--release", "--locked", "--package", "polypod-py", "--target-dir", target]
+        command = [
+            "cargo",
+            "build",
+            "--release",
+            "--locked",
+            "--package",
+            "polypod-py",
+            "--target-dir",
+            target,
+        ]
         seconds = _seconds(command, os.environ | {"PYO3_PYTHON": sys.executable})
     return {"what": "build of the extension", "seconds": seconds, "cores": os.cpu_count()}
 

@@ -1,4 +1,4 @@
-"""What several test files need."""
+"""Fixtures of several test files."""
 
 from __future__ import annotations
 
@@ -89,7 +89,7 @@ def browser(without_tool):
 
 @dataclass
 class Watched:
-    """What a page said and asked for while it was open."""
+    """Console messages and requests of a page while it was open."""
 
     errors: list[str] = field(default_factory=list)
     """Errors on the console, and exceptions that nothing caught."""

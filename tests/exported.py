@@ -1,4 +1,4 @@
-"""What the tests of exported files share: mechanisms, and what a reader must find of their links."""
+"""Common parts of the tests of exported files: mechanisms, and expected properties of their links."""
 
 from __future__ import annotations
 

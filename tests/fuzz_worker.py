@@ -27,7 +27,7 @@ DEADLINE = 30.0
 
 
 def judged(case: Case, path: Path) -> dict[str, Any]:
-    """What became of a file, and what is wrong with that."""
+    """Outcome of a file, and its faults."""
     content, start = case.content, time.perf_counter()
     try:
         if isinstance(content, bytes):

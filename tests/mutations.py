@@ -108,7 +108,7 @@ class Case(NamedTuple):
     """One mutated file."""
 
     source: str
-    """What it was made from."""
+    """Inputs from which it was made."""
     changes: tuple[str, ...]
     content: bytes | str | dict[str, Any]
     """A file's bytes, a text, or what a text would hold."""
@@ -427,7 +427,7 @@ def swap_legs(rng: random.Random, data: Any) -> Any:
 
 
 def ends_swapped(rng: random.Random, data: Any) -> Any:
-    """What stands at the base of a leg stands at its platform, or its cylinder at its piston."""
+    """Swaps the base and platform of a leg, or its cylinder and piston."""
     legs = data.get("legs")
     if isinstance(legs, list) and legs and isinstance(leg := rng.choice(legs), dict):
         a, b = rng.choice((("base", "platform"), ("cylinder", "piston")))

@@ -134,7 +134,7 @@ def command_lines(block: Block) -> Iterator[tuple[list[str], int]]:
 
 
 def _run_commands(page: Path, block: Block) -> str:
-    """What the commands of a block print."""
+    """Output of the commands of a block."""
     printed = ""
     for words, wanted in command_lines(block):
         where = f"{short(page)}, line {block.line}: {' '.join(words)}"

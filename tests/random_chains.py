@@ -2,7 +2,7 @@
 
 Those of the first numbers have telescopic legs in general positions, or, every second one, points on a grid
 and axes that are often parallel, which makes redundant constraints. Later ones, in both ways, have legs on
-sliders too, more actuators than freedoms, or idle freedoms.
+sliders too, more actuators than degrees of freedom, or local degrees of freedom.
 """
 
 from __future__ import annotations
@@ -46,12 +46,12 @@ FAULTS = ("base.axis", "base.joint", "platform.joint", "slider.strut")
 
 
 def letters(kind: str) -> tuple[str, str]:
-    """Joints of a leg, below and above. A rod's turning counts as the leg's."""
+    """Joints of a leg, below and above. A rod's rotation counts as the leg's."""
     return "U" if kind[0] == "(" else kind.replace("P", "", 1)[0], kind[-1]
 
 
 def constraints_of(kind: str) -> int:
-    """Of one leg with generic axes: six less its joints' freedoms."""
+    """Of one leg with generic axes: six less its joints' degrees of freedom."""
     below, above = letters(kind)
     return max(0, 6 - (FREEDOMS[below] + 1 + FREEDOMS[above]))
 
@@ -143,7 +143,7 @@ def _kinds(rng: np.random.Generator, name: str, lines: Lines) -> list[str]:
 
 
 def _general_kinds(rng: np.random.Generator, table: tuple[str, ...], on_rod: tuple[str, ...]) -> list[str]:
-    """Legs that leave at least one freedom, and as many legs as freedoms."""
+    """Legs that leave at least one degree of freedom, and as many legs as degrees of freedom."""
     left, kinds = int(rng.integers(0, 6)), []
     constrained = [kind for kind in table if constraints_of(kind)]
     free = [kind for kind in table if not constraints_of(kind)]
@@ -161,7 +161,7 @@ def _general_kinds(rng: np.random.Generator, table: tuple[str, ...], on_rod: tup
 
 
 def _filled(rng: np.random.Generator, kinds: list[str], free: list[str]) -> list[str]:
-    """With unconstrained legs to have one for each freedom, and sometimes more."""
+    """With unconstrained legs to have one for each degree of freedom, and sometimes more."""
     used = sum(constraints_of(kind) for kind in kinds) + max(0, sum(kind in ON_ROD for kind in kinds) - 1)
     missing = max(0, 6 - used - len(kinds)) + int(rng.random() < 0.15)
     kinds = kinds + rng.choice(free, size=missing).tolist()
@@ -193,7 +193,7 @@ def _lines(rng: np.random.Generator, style: str) -> Lines:
 
 
 def _actuate(rng: np.random.Generator, drawn: Drawn) -> None:
-    """As many legs as freedoms that need one, if there are as many; now and then another number."""
+    """As many legs as degrees of freedom that need one, if there are as many; now and then another number."""
     own = Mobility.of(drawn)
     number = own.dof
     if drawn.number >= TELESCOPIC:

@@ -26,7 +26,7 @@ class State:
     forces: Array
     """(legs,): the least ones, zero without an actuator."""
     torques: Array
-    """About the lines of idle freedoms."""
+    """About the lines of local degrees of freedom."""
     unbalanced: float
     """Share of the motion's power that no forces give."""
 
@@ -48,7 +48,7 @@ def state(
 ) -> State:
     """A random motion at joint values q, under a load on the platform at o. Free struts do not spin.
 
-    idle: body and unit axis of each idle freedom, in the body's axes.
+    idle: body and unit axis of each local degree of freedom, in the body's axes.
     """
     ends, joints = chains(drawn, q)
     matrix, bodies = closures(drawn, joints), links(drawn, q, joints)

@@ -1,4 +1,4 @@
-"""Mechanisms as screws: poses are products of exponentials with closed loops, freedoms are null vectors.
+"""Mechanisms as screws: poses are products of exponentials, degrees of freedom are null vectors.
 
 Nothing here is shared with Polypod: a leg is the row of its joints as screws at home.
 """
@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 SEED = 70011
 SI = {"length": "m", "angle": "rad", "mass": "kg", "inertia": "kg m^2"}
 POSES = 3
-"""At which a mechanism's freedoms are counted: at a singular one a rank is less."""
+"""At which a mechanism's degrees of freedom are counted: at a singular one a rank is less."""
 IDLE_POSES = 8
 """At which twists that no leg feels are held against one another."""
 IDLE_REACH = 0.1
@@ -31,7 +31,8 @@ COMMON = 1e-6
 class Leg:
     kind: str
     screws: list[Array]
-    """(6,) each, velocity at the origin and turn, base axes at home; from the base up, without the rod's."""
+    """(6,) each, velocity at the origin and rotation, base axes at home; from the base up, without the
+    rod's."""
     lower: int
     """How many of them are the base joint's."""
     coordinate: float
@@ -57,7 +58,7 @@ class Drawn:
     style: str
     legs: list[Leg]
     rods: list[Array]
-    """Screw of each rod's turning."""
+    """Screw of each rod's rotation."""
     home: Array
     """(4, 4)."""
     data: dict[str, Any]
@@ -95,14 +96,14 @@ def rotation(vector: Array) -> Array:
 
 
 def rotation_vector(turn: Array) -> Array:
-    """Of a turn of less than half a circle."""
+    """Of a rotation of less than half a circle."""
     axis = np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]]) / 2
     sine, cosine = float(np.linalg.norm(axis)), (np.trace(turn) - 1) / 2
     return axis * (np.arctan2(sine, cosine) / sine if sine > 1e-12 else 1.0)
 
 
 def turning(axis: Array, point: Array) -> Array:
-    """The screw of a turn about a line."""
+    """The screw of a rotation about a line."""
     return np.concatenate([np.cross(point, axis), axis])
 
 
@@ -114,7 +115,7 @@ def skews(v: Array) -> Array:
 
 
 def exponentials(screws: Array, values: Array) -> Array:
-    """(n, 4, 4): displacements of joints with these screws, turns about unit axes or pure translations."""
+    """(n, 4, 4): displacements of joints with these screws, about unit axes or pure translations."""
     v, k = screws[:, :3], skews(screws[:, 3:])
     turns = np.eye(3) + np.sin(values)[:, None, None] * k + (1 - np.cos(values))[:, None, None] * (k @ k)
     points = (k @ v[:, :, None])[:, :, 0]
@@ -234,7 +235,7 @@ def clear(drawn: Drawn) -> bool:
 
     They are not where loops close as a double root, a leg at a dead point in every pose, say: such poses are
     known to the square root of rounding, and so are the singular values there. The platform then feels a
-    freedom more than it has: `extent` counts those that it has.
+    degree of freedom more than it has: `extent` counts those that it has.
     """
     for q in drawn.poses:
         s = np.linalg.svd(closures(drawn, chains(drawn, q)[1]), compute_uv=False)
@@ -244,7 +245,7 @@ def clear(drawn: Drawn) -> bool:
 
 
 def extent(drawn: Drawn) -> int:
-    """Freedoms of the platform from the poses that it has near home: in how many directions they lie.
+    """Degrees of freedom of the platform: the number of directions in which its poses near home lie.
 
     Another mode that happens to be near home is away from it by as much at any reach.
     """
@@ -268,7 +269,7 @@ class Mobility:
     passive: int
     closure_rank: int
     uncontrolled: int
-    """Freedoms left with all actuators locked, idle ones too."""
+    """Degrees of freedom left with all actuators locked, idle ones too."""
     idle: int
 
     @classmethod
@@ -279,7 +280,7 @@ class Mobility:
 
 
 def ranks(drawn: Drawn, q: Array) -> tuple[int, int, int, int]:
-    """Freedoms, passive ones, the closures' rank with a minus sign, and freedoms with actuators locked."""
+    """Degrees of freedom, passive ones, the closures' rank with a minus sign, and with actuators locked."""
     joints = chains(drawn, q)[1]
     full, still = rank(closures(drawn, joints)), joints.shape[1] - rank(joints)
     locked = [column for leg, column in zip(drawn.legs, slides(drawn), strict=True) if leg.actuated]
@@ -306,7 +307,7 @@ def unfelt(drawn: Drawn) -> list[tuple[Array, Array]]:
 
 
 def idle(drawn: Drawn) -> int:
-    """How many freedoms are turns about lines fixed in the platform or the base that no leg feels."""
+    """Number of rotations about lines fixed in the platform or the base that no leg feels."""
     for q in drawn.poses:
         if moves(drawn, np.delete(chains(drawn, q)[1], slides(drawn), axis=1)).shape[1] == 0:
             return 0
@@ -324,7 +325,7 @@ def by(displacement: Array, twists: Array) -> Array:
 
 
 def turns(spaces: list[Array]) -> Array:
-    """(6, k): what is common to spaces of twists (6, n), if all of it is turns about lines."""
+    """(6, k): what is common to spaces of twists (6, n), if all of it is rotations about lines."""
     off = np.vstack([np.eye(6) - t @ np.linalg.pinv(t) for t in spaces])
     _, s, vt = np.linalg.svd(off)
     common = vt[s < COMMON].T

@@ -1,6 +1,7 @@
-"""What must hold of a mechanism that has been loaded, and of an error that refuses one.
+"""Invariants of a mechanism that has been loaded, and of an error that refuses one.
 
-Written from the page "Mechanism files" alone: keys, units, polar points and turns are read here once more.
+Written from the page "Mechanism files" alone: keys, units, polar points and rotations are read here once
+more.
 """
 
 from __future__ import annotations
@@ -84,7 +85,7 @@ SIZES = {
 
 
 def expected(data: Tables) -> Tables:
-    """What `mech.geometry` must hold, from the content of a file."""
+    """Expected `mech.geometry`, from the content of a file."""
     units = {kind: SIZES[unit] for kind, unit in data.get("units", {}).items()}
 
     def si(value: Any, kind: str) -> Any:
@@ -256,7 +257,7 @@ def present(value: Any) -> Any:
 
 
 def nonsense(mech: pp.Mechanism, data: Tables) -> list[str]:
-    """What is wrong with a mechanism that was loaded from `data`."""
+    """Faults of a mechanism that was loaded from `data`."""
     data = present(data)
     wrong = [f"unknown key {key}" for key in unknown_keys(data)]
     wrong += [f"number {n} in the file" for n in numbers(data) if not math.isfinite(n)]
@@ -268,7 +269,7 @@ def nonsense(mech: pp.Mechanism, data: Tables) -> list[str]:
     mobility = mech.mobility()
     felt = mech.dof - len(mobility.idle)
     if not (mech.dof == mobility.dof and felt <= int(mech.actuated.sum()) and 1 <= mech.dof <= 6):
-        wrong.append(f"{mech.dof} freedoms, {mech.actuated.sum()} actuators")
+        wrong.append(f"{mech.dof} degrees of freedom, {mech.actuated.sum()} actuators")
     if len(set(mech.leg_names)) < mech.n_legs or not all(mech.leg_names) or not mech.name.strip():
         wrong.append(f"names {mech.name!r} {mech.leg_names}")
     text = mech.to_toml()
@@ -329,7 +330,7 @@ def _home(mech: pp.Mechanism, facts: Tables) -> list[str]:
     turn, o = rotation(facts["home"]["rotation_vector"]), facts["home"]["position"]
     wrong, size = [], mech.characteristic_length
     if not (np.isfinite(mech.home).all() and abs(mech.home[:3, :3] - turn).max() < 1e-12):
-        wrong.append("home is not turned as in the file")
+        wrong.append("home is not rotated as in the file")
     ends = [(leg["base"]["point"], o + turn @ leg["platform"]["point"]) for leg in facts["legs"]]
     vectors = np.array([b - a for a, b in ends])
     lengths = np.linalg.norm(vectors, axis=1)
@@ -345,7 +346,7 @@ def _home(mech: pp.Mechanism, facts: Tables) -> list[str]:
         wrong.append("home is beyond a limit without a warning")
     if not (np.isfinite(size) and size > 0.0 and (lengths > 1e-9 * size).all()):
         wrong.append(f"lengths {lengths} of size {size}")
-    # Where a strut is nearly square to its rail the place goes by a root.
+    # Where a strut is nearly perpendicular to its rail the place goes by a root.
     slack = 1e-12 if all(leg["slider"] is None for leg in facts["legs"]) else 1e-8
     if not abs(found.lengths - coordinates).max() <= slack * (abs(np.array(ends)).max() + abs(o).max()):
         wrong.append(f"lengths {found.lengths} for {coordinates}")
@@ -383,7 +384,7 @@ def _joints(leg: Tables, along: np.ndarray, turn: np.ndarray, rods: list[Tables]
                 wrong.append("an axis along its leg")
             normals.append((normal / np.linalg.norm(normal), axis))
         elif kind == "R":
-            wrong += ["an R joint that is not square to its leg"] if abs(axis @ along) > 1.1e-6 else []
+            wrong += ["an R joint that is not perpendicular to its leg"] if abs(axis @ along) > 1.1e-6 else []
             normals.append((axis, None))
         else:
             normal = body @ np.asarray(joint["normal"], dtype=float)
@@ -405,7 +406,7 @@ def _joints(leg: Tables, along: np.ndarray, turn: np.ndarray, rods: list[Tables]
 
 
 def _answers(mech: pp.Mechanism) -> list[str]:
-    """What a user asks first has an answer at home, in numbers."""
+    """Faults of the first answers at home, which must be numbers."""
     wrong = []
     if not all(isinstance(note, str) and note for note in mech.warnings):
         wrong.append("an empty warning")
@@ -443,7 +444,7 @@ WHOLE = ("toml", "file", "mechanism")
 
 
 def vague(error: pp.MechanismError, content: bytes | str | Tables) -> list[str]:
-    """What is wrong with an error: faults without a place in the file, without words, without their line."""
+    """Faults of an error: without a place in the file, without words, without their line."""
     text = text_of(content) if isinstance(content, bytes) else content
     data = text
     if isinstance(text, str):

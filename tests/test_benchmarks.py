@@ -1,4 +1,4 @@
-"""What the benchmarks compare Polypod with gives the same answers, and whatever does not is not timed."""
+"""Baselines of the benchmarks give the same answers, and one that does not is not timed."""
 
 from __future__ import annotations
 

@@ -113,7 +113,7 @@ def test_frames_are_those_of_the_legs(mech):
         np.testing.assert_array_equal(cylinder[:, :3, :3], piston[:, :3, :3])
         np.testing.assert_allclose(cylinder[:, :3, 3], np.tile(leg["base"]["point"], (len(poses), 1)))
         np.testing.assert_allclose(piston[:, :3, 3] - cylinder[:, :3, 3], legs.vectors[:, i], atol=1e-12)
-        # n is square to the axis that a universal joint has in its body.
+        # n is perpendicular to the axis that a universal joint has in its body.
         for side, body in (("base", np.eye(4)), ("platform", poses)):
             if leg[side]["joint"] == "U":
                 axis = body[..., :3, :3] @ leg[side]["axis"]

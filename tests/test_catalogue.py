@@ -29,7 +29,7 @@ Array = NDArray[np.float64]
 
 SEED = 20001
 ROW = r"^\| \[`([\w-]+)`\]\(#[\w-]+\) \| (\S+) \| (\d) \|"
-"""Of the table of the page: name, legs, freedoms."""
+"""Of the table of the page: name, legs, degrees of freedom."""
 POSES = 6
 REACH = 0.15
 """How far random coordinates go from home: radians, and parts of the characteristic length."""
@@ -42,12 +42,12 @@ IDENTITY = 1e-12
 
 
 class Known(NamedTuple):
-    """What the literature says of a mechanism."""
+    """Published properties of a mechanism."""
 
     dof: int
-    """Freedoms of the platform."""
+    """Degrees of freedom of the platform."""
     source: str
-    """Where the freedoms stand, or why they are plain."""
+    """Where the degrees of freedom stand, or why they are plain."""
     complex_modes: int | None = None
     """Solutions of forward kinematics, complex ones too, for generic leg lengths."""
 
@@ -58,7 +58,7 @@ LEAST = "one constraint of the leg that is not SPS, UPS or PSS"
 KNOWN = {
     "2rpu-spr": Known(3, "2R1T: Rotational axes analysis of the 2-RPU/SPR 2R1T parallel mechanism"),
     "2upr-rpu": Known(3, "RPR-equivalent: Li, Hervé, IEEE Trans. Robot. 30, 2014"),
-    "3-rpr": Known(3, "two translations and a turn in the plane"),
+    "3-rpr": Known(3, "two translations and a rotation in the plane"),
     "3-rps": Known(3, "Hunt 1983; 16 solutions: Nanua, Waldron, Murthy 1990", 16),
     "3-spr": Known(3, "kinematic inversion of 3-rps, so with its solutions", 16),
     "3-prs": Known(3, "as 3-rps, whose legs these are with the carriages at rest", 16),
@@ -97,12 +97,13 @@ OVERCONSTRAINED = {
     "lu-3spu-2rpu-r": 2,
     "lu-3spu-2rpu-r-turned": 2,
 }
-"""Redundant constraints by the formula of Grübler and Kutzbach with these freedoms; others have none."""
+"""Redundant constraints by the formula of Grübler and Kutzbach with these degrees of freedom; others have
+none."""
 
 SINGULAR = ("griffis-duffy",)
 """Singular at every pose."""
 IDLE = ("linuxcnc-pentakins", "pentapod-5-spu", "pentapod-5-ups")
-"""With a freedom that no leg feels."""
+"""With a degree of freedom that no leg feels."""
 REDUNDANT = ("4-rpr", "4ups-up")
 """With one actuator more than it takes."""
 STARTS = {
@@ -256,7 +257,7 @@ def test_modes_in_the_base_plane_are_their_own_images(name: str) -> None:
 
 
 def test_modes_that_turn_about_the_centre() -> None:
-    """Of a 3-UPU with radial axes: all of them meet there, and the platform may turn as it likes."""
+    """Of a 3-UPU with radial axes: all of them meet there, and the platform may rotate as it likes."""
     mech, pose = load("3-upu-snu"), np.eye(4)
     pose[:3, :3] = Rotation.from_rotvec([0.4, -0.7, 0.3]).as_matrix()
     modes = mech.assembly_modes(mech.inverse_kinematics(pose).lengths)
@@ -417,7 +418,7 @@ def test_griffis_duffy_lengths() -> None:
 
 
 def test_tsai_legs_are_equally_long_at_home() -> None:
-    """What a threefold symmetry gives, to half a millimetre of the digits in the file."""
+    """Threefold symmetry, to half a millimetre of the digits in the file."""
     mech = load("tsai-6-sps")
     assert np.ptp(mech.inverse_kinematics(mech.home).lengths) < 0.5e-3
 

@@ -1,4 +1,4 @@
-"""`polypod list` and `polypod new`, and what `polypod info` tells of freedoms and constraints."""
+"""`polypod list` and `polypod new`, and what `polypod info` tells of degrees of freedom and constraints."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def test_list_has_a_line_for_each(run):
     assert [line.split()[0] for line in lines] == list(pp.list_mechanisms())
     (line,) = (line for line in lines if line.startswith("tricept "))
     assert "3UPS+UPF" in line
-    assert "3 freedoms" in line
+    assert "3 degrees of freedom" in line
 
 
 def test_list_as_json(run):
@@ -116,7 +116,7 @@ def test_parasitic_motion_of_a_3_rps(run):
 
 
 def test_freedoms_of_a_3_rps_at_rest(run):
-    """It rises, and turns about any line in the plane of its upper joints."""
+    """It rises, and rotations about any line in the plane of its upper joints."""
     rise, *turns = facts_of(run, "3-rps")["freedoms"]["screws"]
     assert rise["kind"] == "translation"
     np.testing.assert_allclose(rise["axis"], [0, 0, 1], atol=1e-12)
@@ -135,7 +135,7 @@ def test_freedoms_of_a_3_rps_at_rest(run):
 
 
 def test_a_ball_below_lets_turn_about_itself(run):
-    """The SPR leg's ball 560 mm below o: with translations along Y and Z, turns about axes through it."""
+    """The SPR leg's ball 560 mm below o: with translations along Y and Z, rotations about axes through it."""
     screws = facts_of(run, "4sps-spr")["freedoms"]["screws"]
     assert [row["kind"] for row in screws] == ["translation"] * 2 + ["turn"] * 3
     for row in screws[2:]:

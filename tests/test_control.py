@@ -13,7 +13,7 @@ DATA = Path(__file__).parent / "data"
 
 
 def scaled(mech, factor):
-    """The same mechanism with all masses and inertias times a factor."""
+    """The mechanism with all masses and inertias times a factor."""
     content = mech.to_dict()
     bodies = [content["platform"], *content.get("rods", ())]
     bodies += [leg[part] for leg in content["legs"] for part in ("cylinder", "piston") if part in leg]

@@ -1,4 +1,4 @@
-"""Whatever the texts say and can be tried is tried: code, files, commands, links, names and labels.
+"""Checks of all that the texts say and can be tried: code, files, commands, links, names and labels.
 
 How pages run is told in `pages.py`. Further rules: blocks whose first line is `# motion for NAME` must load
 for that mechanism, and all states must be well, or some not if the line ends in `, beyond its limits`; the
@@ -49,7 +49,9 @@ from pages import (
 EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
 PYTHON_SOURCES = sorted((ROOT / "python").rglob("*.py"))
 RUST_SOURCES = sorted((ROOT / "crates").rglob("*.rs"))
-CORE_FILES = {path.stem: path for path in (ROOT / "crates/core/src").rglob("*.rs") if path.parent.name != "batch"}
+CORE_FILES = {
+    path.stem: path for path in (ROOT / "crates/core/src").rglob("*.rs") if path.parent.name != "batch"
+}
 OPTIONAL = {"exudyn", "mujoco", "pinocchio", "trimesh", "viser"}  # of the extras; some modules need them
 LAST_EQUATION = 44
 
@@ -259,7 +261,7 @@ def test_variables_of_results_exist() -> None:
 
 
 def labels(text: str) -> list[str]:
-    """What stands in brackets that begin with `Eq.` or with a label such as `T5`; ranges as one."""
+    """Contents of brackets that begin with `Eq.` or with a label such as `T5`; ranges as one."""
     text = re.sub(r"\]\s*-\s*\[", "-", text.replace("\\[", "[").replace("\\]", "]"))
     return re.findall(r"\[((?:Eqs?\. ?|T)\d[^\[\]]*)\]", text)
 

@@ -49,7 +49,7 @@ def assert_inertial(given, thin, mass, center, inertia):
 
 
 def assert_placed(mech, pose, found, atol=ROUNDING):
-    """Links are where the core has them; but for turns about their own line that the core does not tell."""
+    """Links are where the core has them, but for rotations about their own line that it does not know."""
     expected, turn_known = places(mech, pose)
     for body, frame in found.items():
         assert np.allclose(frame[:3, 3], expected[body][:3, 3], rtol=0.0, atol=atol), body
@@ -63,8 +63,8 @@ def assert_placed(mech, pose, found, atol=ROUNDING):
 
 SETTLED = 10.0
 """How far the platform may be from the pose of the keyframe. The loops are springs, which give way under the
-weight; the platform moves by that over the smallest singular value, and turns by that over the characteristic
-length. Several loops add up."""
+weight; the platform moves by that over the smallest singular value, and rotations by that over the
+characteristic length. Several loops add up."""
 STILL = 1e-3
 """m/s and rad/s, of any joint in the end."""
 LOOP, THIN_LOOP = 1e-6, 1e-5
@@ -111,7 +111,8 @@ def test_mujoco_has_masses_and_places(name, tmp_path):
         found = {body: frame_in_mujoco(data, names[body]) for body in bodies(mech)}
         assert_placed(mech, at, found)
         assert np.abs(data.efc_pos[: data.ne]).max() < ROUNDING
-    # Not how the loops are made but what is left of the freedoms: of the platform, and of what spins.
+    # Not how the loops are made but what is left of the degrees of freedom: of the platform, and of what
+    # spins.
     free = model.nv - np.linalg.matrix_rank(data.efc_J.reshape(-1, model.nv)[: data.ne], 1e-8)
     assert free == mech.dof + mech.mobility().passive
     assert model.opt.gravity == pytest.approx(mech.geometry["gravity"])

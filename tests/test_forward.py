@@ -72,7 +72,7 @@ def determinant(mech: pp.Mechanism, pose: Array) -> Array:
 
 
 def equations(mech: pp.Mechanism, lengths: Array, pose: tuple[Array, Array]) -> tuple[Array, Array]:
-    """What lengths and joints demand of poses (N, 3, 3) and (N, 3), real or complex; and its rows by (v, ω).
+    """Residuals of lengths and joints at poses (N, 3, 3) and (N, 3), real or complex; and rows by (v, ω).
 
     r·r = ℓ² for actuated legs; for a leg on a rod: r, the rod's line and the platform's axis in one plane;
     for an R joint: r at right angles to its axis.
@@ -397,7 +397,7 @@ def test_the_guess_chooses_the_mode(mech: pp.Mechanism):
 
 
 def test_lengths_of_passive_legs_are_not_read():
-    """A tripod around a middle leg without actuator; with it the platform has three freedoms."""
+    """A tripod around a middle leg without actuator; with it the platform has three degrees of freedom."""
     text = (Path(__file__).parents[1] / "docs/mechanism-file.md").read_text(encoding="utf-8")
     tripod = pp.Mechanism.from_toml(text.split('```toml title="tripod.toml"')[1].split("```")[0])
     pose = tripod.pose({"x": 0.05, "y": 0.02, "z": 0.62})

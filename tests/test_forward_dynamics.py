@@ -42,7 +42,7 @@ def sets_of(mech):
 
 
 def allowed(c):
-    """Orthonormal twists (N, 6, d), turns as arcs, that the oracle's constraints allow."""
+    """Orthonormal twists (N, 6, d), rotations as arcs, that the oracle's constraints allow."""
     Z, scale = o.feasible_directions(c.spec, c.pose)
     return Z / np.broadcast_to(scale, Z.shape[-2])[:, None]
 

@@ -28,7 +28,7 @@ BATCHES = 40
 
 
 def run(first: int, count: int, folder: Path) -> list[dict[str, Any]]:
-    """What became of `count` files; a crash or a hang of one is a result too."""
+    """Outcomes of `count` files; a crash or a hang of one is a result too."""
     results, rows = folder / f"{first}.jsonl", []
     results.touch()
     while len(rows) < count:

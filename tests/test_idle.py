@@ -1,4 +1,4 @@
-"""Freedoms that no leg feels by design: the spin of a rod that all legs end on, or about a line below."""
+"""Local degrees of freedom: the spin of a rod on which all legs end, or rotation about a line below."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def turned_over() -> pp.Mechanism:
         leg["stroke"] = {"min": 200, "max": 1000}
     data["home"] = {"position": [20, 0, 520]}
     data["platform"] |= {"center": [30, 10, 20], "inertia": [0.05, 0.04, 0.03]}
-    data["name"] = "turned over"
+    data["name"] = "rotated over"
     return pp.Mechanism.from_dict(data)
 
 
@@ -52,7 +52,7 @@ MECHANISMS = {
     "pentapod-5-spu": pp.load("pentapod-5-spu"),
     "linuxcnc-pentakins": pp.load("linuxcnc-pentakins"),
     "tilted rod": tilted_rod(),
-    "turned over": turned_over(),
+    "rotated over": turned_over(),
 }
 each = pytest.mark.parametrize("name", MECHANISMS)
 
@@ -78,7 +78,7 @@ def line(mech: pp.Mechanism, pose: Array) -> tuple[Array, Array]:
 
 
 def spun(mech: pp.Mechanism, pose: Array, angle: float) -> Array:
-    """The pose after a turn about the idle line."""
+    """The pose after a rotation about the idle line."""
     point, axis = line(mech, pose)
     turn, moved = Rotation.from_rotvec(angle * axis).as_matrix(), pose.copy()
     moved[:3, :3] = turn @ pose[:3, :3]
@@ -87,7 +87,7 @@ def spun(mech: pp.Mechanism, pose: Array, angle: float) -> Array:
 
 
 def spin(mech: pp.Mechanism, pose: Array) -> Array:
-    """(..., 6): the twist of a turn by one radian per second about the line."""
+    """(..., 6): the twist of a rotation by one radian per second about the line."""
     point, axis = line(mech, pose)
     return np.concatenate([np.cross(axis, pose[..., :3, 3] - point), axis], axis=-1)
 
@@ -101,7 +101,7 @@ def test_the_line_is_that_of_the_joints(name: str) -> None:
     mobility = mech.mobility()
     assert (mech.dof, mobility.uncontrolled, len(mobility.idle), mech.n_rows) == (6, 0, 1, 6)
     [idle] = mobility.idle
-    assert idle.body == ("base" if name == "turned over" else "platform")
+    assert idle.body == ("base" if name == "rotated over" else "platform")
     joints = np.array([leg[idle.body]["point"] for leg in mech.geometry["legs"]])
     along = np.array(idle.axis)
     assert abs(np.linalg.norm(along) - 1.0) < 1e-12
@@ -123,7 +123,7 @@ def test_no_leg_feels_the_spin(name: str) -> None:
 
 
 def test_two_and_three_idle_freedoms() -> None:
-    """Legs that end in one point hold none of the turns about it."""
+    """Legs that end in one point hold none of the rotations about it."""
     data = pp.load("pentapod-5-ups").to_dict()
     data["legs"] = data["legs"][:3]
     for leg in data["legs"]:
@@ -138,7 +138,7 @@ def test_two_and_three_idle_freedoms() -> None:
         for freedom in idle
         if np.linalg.norm(np.cross(np.array(freedom.point) - [0.01, 0.005, 0.02], freedom.axis)) > 1e-9
     ] == []
-    with pytest.raises(UnsupportedError, match="one idle freedom"):
+    with pytest.raises(UnsupportedError, match="one local degree of freedom"):
         mech.assembly_modes([0.5] * 3)
     # Base joints on a line as well: the machine swings about that, too.
     data = pp.load("pentapod-5-spu").to_dict()
@@ -158,7 +158,7 @@ def test_a_leg_that_is_missing_is_no_idle_freedom() -> None:
     data = pp.load("ups-hexapod").to_dict()
     data["legs"] = data["legs"][:5]
     with pytest.raises(
-        pp.MechanismError, match="5 actuated legs for 6 freedoms; at least 6 legs must be actuated"
+        pp.MechanismError, match="5 actuated legs for 6 degrees of freedom; at least 6 legs must be actuated"
     ):
         pp.Mechanism.from_dict(data)
     # A passive leg beside the rod feels the spin, which an actuator should then hold.
@@ -235,7 +235,8 @@ def test_idle_is_not_singular(name: str) -> None:
     found = mech.singularity(pose)
     assert set(found.kind.tolist()) == {SingularityKind.NONE}
     assert set(found.uncontrolled.tolist()) == {0}
-    # Singular values of five rows on the twists that are square to the spin: those of the rows themselves.
+    # Singular values of five rows on the twists that are perpendicular to the spin: those of the rows
+    # themselves.
     J = mech.jacobian(pose)[:, :5].copy()
     J[..., 3:] /= mech.characteristic_length
     values = np.linalg.svd(J, compute_uv=False)
@@ -262,7 +263,7 @@ def test_legs_in_a_plane_with_the_rod_are_singular() -> None:
     assert Status(int(mech.inverse_dynamics(pose, np.zeros(6), np.zeros(6)).status)) is Status.SINGULAR
 
 
-@pytest.mark.parametrize("name", ["pentapod-5-ups", "tilted rod", "turned over"])
+@pytest.mark.parametrize("name", ["pentapod-5-ups", "tilted rod", "rotated over"])
 def test_assembly_modes_up_to_the_spin(name: str) -> None:
     """All lines that a search from random poses finds, by other equations and another method."""
     mech = MECHANISMS[name]
@@ -280,7 +281,7 @@ def test_assembly_modes_up_to_the_spin(name: str) -> None:
         return np.linalg.norm(x[:3] + platform @ turn.T - base, axis=1) - lengths
 
     def key(pose: Array) -> Array:
-        """What a spin leaves: distances of the line, or seen from the platform, in base axes."""
+        """Invariants of a spin: distances of the line, or seen from the platform, in base axes."""
         if mech.mobility().idle[0].body == "platform":
             return np.concatenate(line(mech, pose))
         point, axis = line(mech, pose)
@@ -432,7 +433,7 @@ def test_lattices_and_computed_torque_are_refused() -> None:
     mech = MECHANISMS["pentapod-5-ups"]
     with pytest.raises(UnsupportedError, match="spin"):
         pp.length_lattice(mech, step=0.1)
-    with pytest.raises(UnsupportedError, match="idle freedom"):
+    with pytest.raises(UnsupportedError, match="local degree of freedom"):
         ComputedTorque(mech, None, frequency=10.0)  # type: ignore[arg-type]
 
 

@@ -1,4 +1,4 @@
-"""What must not change when a mechanism is described otherwise: moved, turned, mirrored, scaled, renumbered.
+"""Invariance when a mechanism is described otherwise: moved, rotated, mirrored, scaled, renumbered.
 
 Each mechanism gets bodies of no symmetry, damping, a load and limits of all kinds; then all results up to
 power and the relative slack of all limits are compared.
@@ -149,7 +149,7 @@ def same(actual: dict[str, Array], expected: dict[str, Array], tolerance: float 
 
 @dataclass
 class Change:
-    """Base axes turned by `base` and shifted, platform axes by `platform`; both are mirrored or none."""
+    """Base axes rotated by `base` and shifted, platform axes by `platform`; both are mirrored or none."""
 
     base: Array
     platform: Array
@@ -217,7 +217,7 @@ class Change:
         return States(pose, twist, acceleration)
 
     def results(self, mech: pp.Mechanism, old: dict[str, Array]) -> dict[str, Array]:
-        """What the results must become."""
+        """Expected results."""
         new = dict(old)
         for names, length, mass, time in (
             (("lengths",), 1, 0, 0),
@@ -239,7 +239,7 @@ class Change:
             new[name] = self.sign * new[name] @ self.base.T
         for name in ("leg_spin", "leg_spin_rate", "rod_angle"):
             new[name] = self.sign * new[name]
-        # About an axis that is mirrored as a line a turn changes sign; about n and R axes it does not.
+        # About an axis that is mirrored as a line a rotation changes sign; about n and R axes it does not.
         for k, side in enumerate(("base", "platform")):
             legs = zip(mech.leg_letters, mech.geometry["legs"], strict=True)
             lines = [letters[2 * k] == "U" or leg[side]["rod"] is not None for letters, leg in legs]
@@ -266,8 +266,8 @@ SAME = Change(np.eye(3), np.eye(3), np.zeros(3))
 MIRROR = np.diag([-1.0, 1.0, 1.0])
 CHANGES = {
     "base shifted": replace(SAME, shift=SHIFT),
-    "base turned and shifted": replace(SAME, base=TURN, shift=SHIFT),
-    "platform axes turned": replace(SAME, platform=OTHER),
+    "base rotated and shifted": replace(SAME, base=TURN, shift=SHIFT),
+    "platform axes rotated": replace(SAME, platform=OTHER),
     "mirrored": replace(SAME, base=MIRROR, platform=MIRROR),
     "mirrored askew": replace(SAME, base=MIRROR @ TURN, platform=OTHER @ MIRROR, shift=SHIFT),
     "three times as long": replace(SAME, length=3.0),

@@ -333,7 +333,7 @@ def test_a_mechanism_shows_its_legs_and_itself(name):
     table = [row for row in reader.rows if row and row[0] in mech.leg_names]
     assert [row[0] for row in table] == list(mech.leg_names)
     assert [row[1] for row in table] == list(mech.leg_letters)
-    assert f"{mech.dof} freedoms" in "".join(reader.texts)
+    assert f"{mech.dof} degrees of freedom" in "".join(reader.texts)
     assert 'src="data:image/png;base64,iVBORw0KGgo' in mech._repr_html_()
     for warning in mech.warnings:
         assert warning in "".join(reader.texts)

@@ -81,7 +81,7 @@ def draw_body(rng, symmetric):
 
 
 def across(rng, *vectors):
-    """A unit vector square to the given ones, drawn at random where there is a choice."""
+    """A unit vector perpendicular to the given ones, drawn at random where there is a choice."""
     v = np.cross(*vectors) if len(vectors) == 2 else np.cross(vectors[0], rng.normal(size=3))
     return v / np.linalg.norm(v)
 
@@ -357,7 +357,7 @@ def lu_coordinates():
 
 
 def lu_limits(starts):
-    """The same with h so that the shortest leg is at 650 mm or the longest at 850 mm, or close by."""
+    """Coordinates with h such that the shortest leg is at about 650 mm or the longest at about 850 mm."""
     spec = o.read(o.lu())
     q, upper = np.repeat(starts, 2, axis=0), np.tile([False, True], len(starts))
 
@@ -805,7 +805,7 @@ def motion_coordinates(name, n=6):
 
 
 def at_time(q, q1, q2, t):
-    """The same at time t of a motion with constant second rates."""
+    """Coordinates with rates at time t of a motion with constant second rates."""
     return {k: q[k] + q1[k] * t + q2[k] * t * t / 2 for k in q}, {k: q1[k] + q2[k] * t for k in q}, q2
 
 
@@ -888,7 +888,7 @@ def test_second_order_of_central_differences(name):
 
 
 def test_legs_on_one_rod_keep_the_angle_between_their_planes():
-    """Legs whose planes through their rod differ are tied by it: one freedom less than two UPU legs leave.
+    """A rod ties legs in different planes through it: one degree of freedom less than two UPU legs leave.
 
     The rod carries both revolute joints, so that the angle between their axes stays. Where both platform axes
     lie on one line, as in the paper, the angle stays anyway; elsewhere one of four actuators is redundant.
@@ -1291,7 +1291,7 @@ def test_eq34a():
 
 
 def test_eq34b():
-    """d'_i1 and d'_i2 are what turns Eq. 34a into the product's angular acceleration."""
+    """d'_i1 and d'_i2 are what rotates Eq. 34a into the product's angular acceleration."""
 
     def eps(m):
         R1, R2 = o.eq33_axes(m)

@@ -37,7 +37,7 @@ def corners(radii):
 
 
 def turn(axis, angle):
-    """The turn about X (0) or Y (1)."""
+    """The rotation about X (0) or Y (1)."""
     c, s = np.cos(angle), np.sin(angle)
     return np.array([[1, 0, 0], [0, c, -s], [0, s, c]] if axis == 0 else [[c, 0, s], [0, 1, 0], [-s, 0, c]])
 

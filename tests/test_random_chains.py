@@ -49,21 +49,21 @@ FORCES = 1e-9
 """Relative to the largest force: rounding, magnified by singular values and redundant closures."""
 LOAD = np.array([300.0, -200.0, -500.0, 20.0, 40.0, -30.0])
 UNCLEAR = "no clear rank"
-"""Of these the freedoms alone are compared; there are not many."""
+"""Of these the degrees of freedom alone are compared; there are not many."""
 MISFIT = "joints or struts do not fit the rail"
 LINE = 1e-8
-"""Share of a turn about an idle line that a leg may feel: rounding of ranks."""
+"""Share of a rotation about an idle line that a leg may feel: rounding of ranks."""
 LENGTHS = 1e-10
 """Relative to the longest leg: loops are closed to 1e-13, nearly singular ones magnify that."""
 REGULAR = 1e-3
 """Least singular value, above which forward kinematics must come back."""
 TWIN_REGULAR = 0.02
-"""The same for forces: rounding grows with its inverse."""
+"""Least singular value, above which forces must agree: rounding grows with its inverse."""
 
 
 @dataclass
 class Outcome:
-    """What became of one mechanism."""
+    """Outcome of one mechanism."""
 
     number: int
     kinds: tuple[str, ...]
@@ -102,7 +102,7 @@ def examine(number: int) -> Outcome:
         return out
     found = mech.mobility()
     out.idle, out.redundant = len(found.idle), mech.redundantly_actuated
-    # What actuators do not hold, by screws: idle freedoms too.
+    # What actuators do not hold, by screws: local degrees of freedom too.
     left = found.uncontrolled + out.idle
     theirs = Mobility(found.dof, found.passive, found.closure_rank, left, out.idle)
     if theirs != own:
@@ -112,7 +112,9 @@ def examine(number: int) -> Outcome:
     if found.redundant != 6 * (len(drawn.legs) - 1) - own.closure_rank or found.joint_freedoms != sum(
         (len(leg.screws) for leg in drawn.legs), len(drawn.rods)
     ):
-        out.wrong.append(f"{found.redundant} redundant closures, {found.joint_freedoms} freedoms of joints")
+        out.wrong.append(
+            f"{found.redundant} redundant closures, {found.joint_freedoms} degrees of freedom of joints"
+        )
     lines(mech, drawn, out)
     kinematics(mech, drawn, out)
     power(mech, drawn, out)
@@ -126,12 +128,12 @@ def freedoms(drawn: Drawn) -> int:
     try:
         return pp.Mechanism.from_dict(drawn.data).dof
     except pp.MechanismError as error:
-        said = re.search(r"(?:for|leave|all) (\d+) freedoms|(one) freedom", str(error))
+        said = re.search(r"(?:for|leave|all) (\d+) degrees of freedom|(one) degree of freedom", str(error))
         return int(said[1] or 1) if said else 0
 
 
 def faulty(drawn: Drawn) -> tuple[str, list[str]]:
-    """What a mechanism with legs that no loader may take is refused for."""
+    """Reason for which a mechanism with impossible legs is refused."""
     try:
         pp.Mechanism.from_dict(drawn.data)
     except pp.MechanismError as error:
@@ -141,7 +143,7 @@ def faulty(drawn: Drawn) -> tuple[str, list[str]]:
 
 
 def lines(mech: pp.Mechanism, drawn: Drawn, out: Outcome) -> None:
-    """Turns about the lines of idle freedoms are among the twists that no leg feels, at poses near home."""
+    """Rotations about lines of local degrees of freedom are twists that no leg feels, at poses near home."""
     for line in mech.mobility().idle:
         axis, point = np.array(line.axis), np.array(line.point)
         if line.body == "platform":
@@ -150,28 +152,28 @@ def lines(mech: pp.Mechanism, drawn: Drawn, out: Outcome) -> None:
         for end, twists in unfelt(drawn):
             now = by(end, turn) if line.body == "platform" else turn
             if not abs(now - twists @ (twists.T @ now)).max() < LINE:
-                out.wrong.append(f"legs feel the turn about the idle line {line}")
+                out.wrong.append(f"legs feel the rotation about the idle line {line}")
 
 
 def shaky(drawn: Drawn) -> list[str]:
-    """What is wrong with the freedoms of a mechanism whose ranks are not clear."""
+    """Faults in the degrees of freedom of a mechanism whose ranks are not clear."""
     dof, found = extent(drawn), freedoms(drawn)
-    return [] if found == dof else [f"{found} freedoms, but poses in {dof} directions"]
+    return [] if found == dof else [f"{found} degrees of freedom, but poses in {dof} directions"]
 
 
 def refusal(error: pp.MechanismError, own: Mobility, actuators: int) -> tuple[str, list[str]]:
     """The reason without its numbers, and what is wrong with it."""
     fault, *others = error.faults
     reason = re.sub(r"\d+", "n", fault.message.split(";")[0])
-    said = re.match(r"(\d+) actuated legs for (\d+) freedoms.*; at least (\d+) legs", fault.message)
+    said = re.match(r"(\d+) actuated legs for (\d+) degrees of freedom.*; at least (\d+) legs", fault.message)
     if said:
-        # Fewer are needed where freedoms are idle.
+        # Fewer are needed where degrees of freedom are idle.
         needed = own.dof - own.idle
         right = [int(n) for n in said.groups()] == [actuators, own.dof, needed] and actuators < needed
     elif "idle, so that no leg moves it" in fault.message:
         right = own.dof == own.idle > 0
     else:
-        right = "leave the platform no freedom" in fault.message and own.dof == 0
+        right = "leave the platform no degree of freedom" in fault.message and own.dof == 0
     return reason, [] if right and not others else [
         f"refused: {fault}; by screws {own}, {actuators} actuators"
     ]
@@ -211,7 +213,7 @@ def kinematics(mech: pp.Mechanism, drawn: Drawn, out: Outcome) -> None:
     lengths = own + 2.0 * sign * np.minimum(lean, 0.0)
     size = abs(lengths).max(axis=1)
     found = mech.inverse_kinematics(poses)
-    # Where a strut is square to its rail, a place is known to the square root of rounding.
+    # Where a strut is perpendicular to its rail, a place is known to the square root of rounding.
     off = abs(found.lengths - lengths) * np.minimum(abs(lean), 1.0)
     out.lengths = float((off.max(axis=1) / size).max())
     if not out.lengths < LENGTHS:
@@ -304,7 +306,10 @@ def table(outcomes: list[Outcome]) -> str:
             *rows,
             "",
             *(f"{number} {reason}" for reason, number in reasons.items()),
-            *(f"{number} with (idle freedoms, redundant legs) {kind}" for kind, number in special.items()),
+            *(
+                f"{number} with (local degrees of freedom, redundant legs) {kind}"
+                for kind, number in special.items()
+            ),
         ]
     )
 
@@ -414,7 +419,7 @@ def test_struts_may_reach_their_rails_near_home_alone() -> None:
 
 @pytest.mark.parametrize("number", [14273, 15988])
 def test_mobility_is_that_of_the_mode_of_home(number: int) -> None:
-    """Others have fewer freedoms (14273), or a leg without length (15988)."""
+    """Others have fewer degrees of freedom (14273), or a leg without length (15988)."""
     drawn = draw(number)
     assert freedoms(drawn) == Mobility.of(drawn).dof
 
@@ -428,13 +433,13 @@ def test_legs_on_a_rod_may_end_in_one_point() -> None:
 
 
 def test_a_mechanism_with_idle_freedoms_alone_is_refused() -> None:
-    """Three RPS legs to one point: it turns about the point, and no leg moves it."""
+    """Three RPS legs to one point: it rotates about the point, and no leg moves it."""
     legs = [
         {"base": {"joint": "R", "point": point, "axis": axis}, "platform": {"joint": "S", "point": [0, 0, 0]}}
         for point, axis in (([6, 0, 0], [0, 1, 0]), ([-3, 5, 0], [5, 3, 0]), ([-3, -5, 0], [1, 1, -0.8]))
     ]
     data = {"name": "ball", "units": {"length": "m"}, "home": {"position": [0, 0, 10]}, "legs": legs}
-    with pytest.raises(pp.MechanismError, match="all 3 freedoms of the platform are idle"):
+    with pytest.raises(pp.MechanismError, match="all 3 degrees of freedom of the platform are idle"):
         pp.Mechanism.from_dict(data)
 
 
@@ -462,7 +467,7 @@ def test_many_mechanisms(batch: int, first: int) -> None:
     ],
 )
 def test_screws_give_the_freedoms_of_the_catalogue(name: str, dof: int, passive: int) -> None:
-    """The numpy side by itself, on mechanisms whose freedoms are known."""
+    """The numpy side by itself, on mechanisms whose degrees of freedom are known."""
     found = Mobility.of(of_geometry(pp.load(name).geometry))
     assert (found.dof, found.passive, found.idle) == (dof, passive, 0)
 

@@ -173,7 +173,7 @@ def given_wrenches(c: Case, wrench=None, axes="base") -> dict:
 
 
 def left_over(c: Case, joints, found, given):
-    """What is left of the balance of each link, (links, N, 6), forces and torques about its mass centre."""
+    """Residual of the balance of each link, (links, N, 6), forces and torques about its mass centre."""
     rest = {name: w.copy() for name, (w, _) in given.items()}
     for k, joint in enumerate(joints):
         for link, sign in ((joint.outer, 1), (joint.inner, -1)):
@@ -191,7 +191,7 @@ def scale_of(c: Case, found):
 
 
 # ------------------------------------------------------------------------------------------------------------
-# Balance, freedoms, active forces
+# Balance, degrees of freedom, active forces
 # ------------------------------------------------------------------------------------------------------------
 
 
@@ -232,7 +232,7 @@ def test_joints_stand_where_they_are_and_carry_nothing_that_they_leave_free(name
 
 @each
 def test_joint_axes_are_those_of_the_joints(name):
-    """Orthonormal, right-handed; free turns about the first axes; δ second in a prismatic joint."""
+    """Orthonormal, right-handed; free rotations about the first axes; δ second in a prismatic joint."""
     c = any_case(name)
     answer, joints = reactions(c), joints_of(c)
     axes = answer.axes
@@ -276,7 +276,7 @@ def test_prismatic_joints_carry_the_active_forces(name):
 
 
 def system(c: Case, k: int):
-    """The balances of all links and the freedoms of all joints at state k, for all reactions (F, T/Λ).
+    """Balances of all links and degrees of freedom of all joints at state k, for all reactions (F, T/Λ).
 
     Matrix and right-hand side; pure numbers and N.
     """
@@ -393,7 +393,7 @@ def test_length_weighs_couples_and_touches_nothing_determinate():
 
 
 def light(name) -> Case:
-    """The same states with legs and rods that have no mass."""
+    """The states with legs and rods that have no mass."""
     c = any_case(name)
     tables = c.mech.to_dict()
     for rod in tables["rods"]:
@@ -458,7 +458,7 @@ def test_coupled_forces_fall_out_of_massless_legs(name):
 
 @pytest.mark.parametrize("name", ["lu", "rod-lined"])
 def test_with_mass_they_are_what_legs_carry_and_the_coupled_forces(name):
-    """What the legs' own mass does at b, carried there as in [T14], is the whole difference."""
+    """The effect of the legs' own mass at b, carried there as in [T14], is the whole difference."""
     c = any_case(name)
     answer, dynamics = reactions(c), c.mech.inverse_dynamics(c.T, c.twist, c.acceleration)
     coupled = c.mech.coupled_forces(c.T, dynamics.constraint)
@@ -543,7 +543,7 @@ def test_a_leg_along_its_axis_has_no_answer():
 
 
 def test_a_design_that_is_singular_everywhere_has_no_answer():
-    """Similar hexagons with S joints below: the platform keeps a freedom that no actuator holds."""
+    """Similar hexagons with S joints below: the platform keeps a degree of freedom that no actuator holds."""
     data = pp.load(DATA / "stewart-gough.toml").to_dict()
     for leg, angle in zip(data["legs"], (10, 50, 130, 170, 250, 290), strict=True):
         leg["base"] = {"joint": "S", "point": {"radius": 500.0, "angle": angle}}

@@ -1,4 +1,4 @@
-"""More actuated legs than freedoms: least forces, legs that must agree, against numpy's own solutions."""
+"""Redundant actuation: least forces, legs that must agree, against numpy's own solutions."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def seven_legs() -> pp.Mechanism:
 
 
 def six_on_a_rod() -> pp.Mechanism:
-    """Redundant in five freedoms, and idle in the sixth."""
+    """Redundant in five degrees of freedom, and idle in the sixth."""
     data = pp.load("pentapod-5-ups").to_dict()
     leg = dict(data["legs"][0])
     leg["base"] = {"joint": "U", "point": {"radius": 300, "angle": 50, "z": -80}, "axis": {"angle": 140}}
@@ -77,7 +77,7 @@ def motions(mech: pp.Mechanism, count: int = STATES, seed: int = 7) -> tuple[Arr
 
 
 def rows(mech: pp.Mechanism, pose: Array) -> tuple[Array, Array]:
-    """Rows of legs and the others, for twists with turns counted as arcs."""
+    """Rows of legs and the others, for twists with rotations counted as arcs."""
     J, k = mech.jacobian(pose).copy(), int(mech.actuated.sum())
     J[..., 3:] /= mech.characteristic_length
     return J[:k], J[k:]
@@ -181,7 +181,7 @@ def test_preferred_forces_broadcast_and_are_checked() -> None:
 def test_forward_dynamics_returns(name: str) -> None:
     mech = MECHANISMS[name]
     if mech.mobility().idle:
-        pytest.skip("the torque of an idle freedom is none of a leg: see test_idle")
+        pytest.skip("the torque of a local degree of freedom is none of a leg: see test_idle")
     pose, twist, acceleration = motions(mech)
     near = np.linspace(-100.0, 100.0, mech.n_legs)
     for preferred in (None, near):
@@ -275,7 +275,7 @@ def test_lengths_that_agree_to_a_micrometre_have_a_pose() -> None:
     found = mech.forward_kinematics(near)
     assert set(found.status.tolist()) == {Status.OK}
     assert (found.residual < 1e-6 * mech.characteristic_length).all()
-    # The nearest pose in the sense of least squares: what is missed is square to every motion.
+    # The nearest pose in the sense of least squares: what is missed is perpendicular to every motion.
     for i in range(STATES):
         A, _ = rows(mech, found.pose[i])
         missed = (mech.inverse_kinematics(found.pose[i]).lengths - near[i])[mech.actuated]
@@ -327,7 +327,7 @@ def test_singular_poses_of_a_subset_are_passed() -> None:
 
 
 def test_singular_where_the_whole_loses_its_rank() -> None:
-    """All four legs through one point: nothing holds the turn about it."""
+    """All four legs through one point: nothing holds the rotation about it."""
     data = MECHANISMS["4-rpr"].to_dict()
     for leg in data["legs"]:
         leg["platform"]["point"]["angle"] = leg["base"]["point"]["angle"]

@@ -43,7 +43,7 @@ def _inner(member: Any) -> Any:
 
 
 def members(thing: Any) -> Iterator[tuple[str, Any]]:
-    """What is public in a module or class and made there."""
+    """Public names of a module or class that are made there."""
     for name, member in vars(thing).items():
         if name.startswith("_"):
             continue
@@ -94,7 +94,7 @@ def test_every_method_of_a_mechanism_is_in_the_reference() -> None:
 
 @pytest.mark.parametrize("name", sorted(documented()))
 def test_it_has_a_docstring(name: str) -> None:
-    """What has none is left out of the page."""
+    """Names without one are left out of the page."""
     assert inspect.getdoc(documented()[name]), name
 
 
@@ -102,7 +102,7 @@ def test_it_has_a_docstring(name: str) -> None:
 
 
 def fields_of(kind: type) -> dict[str, str]:
-    """What the source says below each field of a data class."""
+    """Docstrings below the fields of a data class, from the source."""
     body = ast.parse(textwrap.dedent(inspect.getsource(kind))).body[0].body  # type: ignore[attr-defined]
     found = {}
     for field, text in zip(body, [*body[1:], None], strict=True):

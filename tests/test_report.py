@@ -180,7 +180,7 @@ def test_formulas_become_html(text, html):
 
 
 def test_no_formula_of_the_curves_is_left_over(html):
-    """Whatever the figures write for matplotlib has its HTML: no command and no brace remains."""
+    """All mathematics of the figures has its HTML: no command and no brace remains."""
     data = page_data(html)
     texts = [chart["label"] for chart in data["charts"]]
     texts += [curve["name"] for chart in data["charts"] for curve in chart["curves"]]
@@ -221,7 +221,7 @@ def test_a_state_of_a_long_motion_has_the_reactions_that_it_has_alone(mech):
 
 
 def outside(html: str) -> list[str]:
-    """What a browser would fetch from elsewhere."""
+    """Addresses that a browser would fetch from elsewhere."""
     page = re.sub(r"<script.*?</script>|<pre>.*?</pre>", "", html, flags=re.S)
     found = re.findall(r'(?:src|href|url)\s*[=(]\s*["\']?([^"\'\s>)]+)', page)
     return [address for address in found if not address.startswith(("#", "data:"))]

@@ -80,7 +80,7 @@ def time_range(page, index: int) -> list[float]:
 
 
 def numbers_of(page, index: int) -> list[float]:
-    """What stands beside the names of a chart's curves."""
+    """Values beside the names of a chart's curves."""
     texts = page.locator(f'[data-chart="{index}"] output').all_inner_texts()
     return [float(text.replace("−", "-")) for text in texts]
 

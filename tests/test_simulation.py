@@ -48,7 +48,7 @@ def sprung(mech, pose, stiffness):
 
 
 def conservative(mech):
-    """The same mechanism without load, damping and efficiency."""
+    """The mechanism without load, damping and efficiency."""
     content = mech.to_dict()
     for key in ("load", "dynamics"):
         content.pop(key, None)

@@ -121,7 +121,7 @@ def test_measures_do_not_depend_on_the_size_of_the_machine(name):
 
 
 def assert_uncontrolled(mech: pp.Mechanism, name: str | None, pose: np.ndarray, found) -> None:
-    """The twist changes no leg's length and breaks no constraint, and turns about the given axis."""
+    """The twist changes no leg's length and breaks no constraint, and rotations about the given axis."""
     twist = found.twist
     J = mech.jacobian(pose)
     assert J @ twist == pytest.approx(np.zeros(6), abs=1e-9)
@@ -353,7 +353,7 @@ def test_kinds_are_those_of_the_core():
 
 
 def yaw(curve, n: int) -> Motion:
-    """The hexapod turned about z by a function of time in [0, 1]."""
+    """The hexapod rotated about z by a function of time in [0, 1]."""
     fine = np.linspace(0.0, 1.0, 201)
     q = {name: np.full(201, value) for name, value in QUARTER.items()} | {"rz": curve(fine)}
     return Motion.through(fine, q, set="pose").sample(np.linspace(0.0, 1.0, n))

@@ -135,7 +135,7 @@ def test_pictures_of_the_main_pages(browser, screenshots: Path, home: str, schem
 
 
 def test_the_reference_holds_every_public_name(site: Path) -> None:
-    """What the inventory of the site lists: names, as other sites would refer to them."""
+    """The inventory of the site lists all public names, as other sites would refer to them."""
     _, _, _, _, packed = (site / "objects.inv").read_bytes().split(b"\n", 4)
     listed = {line.split(" ")[0] for line in zlib.decompress(packed).decode().splitlines()}
     for name in pp.__all__:

@@ -193,7 +193,7 @@ def required(motion, gravity):
 
 @pytest.mark.parametrize("name", NAMES)
 def test_reactions_balance_the_motion_of_every_link(name):
-    """With what joints leave free they are all that balance and freedoms allow: no others exist."""
+    """With what joints leave free they are all that balance and degrees of freedom allow: no others exist."""
     pytest.importorskip("pinocchio")
     mech = sliders.mechanism(name)
     spec, gravity = mech.geometry, np.array(mech.geometry["gravity"])
@@ -291,7 +291,7 @@ def test_a_pose_of_the_other_branch_says_so():
 
 
 def across():
-    """A pose of "pus" with the strut of leg 6 square to its rail, to rounding; the others are not near it."""
+    """A pose of "pus" with the strut of leg 6 perpendicular to its rail, to rounding, and others not."""
     mech = sliders.mechanism("pus")
     leg = mech.geometry["legs"][5]
     pose = np.array(mech.home)
@@ -307,7 +307,7 @@ def test_a_strut_across_its_rail_is_named():
     found = mech.singularity(pose)
     assert SingularityKind(int(found.kind)) is SingularityKind.STRUT_ACROSS_RAIL
     assert int(found.leg) == 5
-    assert "square to its rail" in SingularityKind.STRUT_ACROSS_RAIL.message
+    assert "perpendicular to its rail" in SingularityKind.STRUT_ACROSS_RAIL.message
     assert abs(found.transmission[5]) < 1e-6
     pose[2, 3] -= 0.02
     assert mech.singularity(pose).kind == SingularityKind.NONE

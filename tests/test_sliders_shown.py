@@ -58,7 +58,7 @@ def test_rails_reach_from_end_to_end_of_the_stroke(mech):
 
 @pytest.mark.parametrize("name", sliders.LEGS)
 def test_frames_are_at_the_foot(name):
-    """The carriage does not turn; the strut goes from it to its joint on the platform."""
+    """The carriage does not rotate; the strut goes from it to its joint on the platform."""
     mech, poses = sliders.mechanism(name), states(name)[0]
     names, found = [link.name for link in links_of(mech)], link_frames(mech, poses)
     legs = mech.inverse_kinematics(poses)

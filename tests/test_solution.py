@@ -227,7 +227,7 @@ def test_3_rps() -> None:
 
 
 def test_3_rps_from_a_table(tmp_path: Path) -> None:
-    """Of the set pose as many coordinates as there are freedoms, in a file too."""
+    """Of the set pose as many coordinates as there are degrees of freedom, in a file too."""
     rows = np.column_stack([TIME, *RPS_WAVE.values()])
     path = tmp_path / "wave.csv"
     header = "time [s], z [m], rx [rad], ry [rad]"

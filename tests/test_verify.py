@@ -342,7 +342,7 @@ OFF = {
         lambda a, R: replace(a, piston_acceleration=np.einsum("nji,nlj->nli", R, a.piston_acceleration)),
         {"piston_acceleration"},
     ),
-    "rod turning the other way": (
+    "rod rotating the other way": (
         "kinematics",
         lambda a, R: replace(a, rod_omega=-a.rod_omega, rod_eps=-a.rod_eps),
         {"rod_omega", "rod_eps"},
@@ -382,7 +382,7 @@ def swap_load_axes(tables):
 
 
 def flip_axis(tables):
-    """The same constraint and lengths, but the leg's frame has turned by half a turn."""
+    """Fault: equal constraint and lengths, but the leg's frame is rotated by half a turn."""
     leg = next(leg for leg in tables["legs"] if leg["base"]["joint"] == "S")
     leg["platform"]["axis"] = [-a for a in leg["platform"]["axis"]]
 

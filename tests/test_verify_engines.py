@@ -83,7 +83,7 @@ def test_as_many_rows_are_released_as_mobility_says(name):
 
 
 def test_what_is_released_on_the_paper_s_mechanism():
-    """The two redundant constraints of the legs on one rod are turns of those legs."""
+    """The two redundant constraints of the legs on one rod are rotations of those legs."""
     mech, (pose, twist, _) = lu_states()
     links = Links(describe(mech))
     for at, moving in zip(pose, twist, strict=True):
@@ -141,7 +141,7 @@ def every_link(mech):
 
 
 def without_masses(mech, links):
-    """The same mechanism, some of its legs' links without mass."""
+    """The mechanism with some of its legs' links without mass."""
     tables = mech.to_dict()
     for leg, link in links:
         del tables["legs"][leg][link]
@@ -152,7 +152,7 @@ def without_masses(mech, links):
 @pytest.mark.parametrize("some", ["all", "one piston"])
 @pytest.mark.parametrize("name", ["6-sps", "6-ups", "rod-lined"])
 def test_legs_without_mass(name, some, engine):
-    """Also those that spin freely, which nothing but rounding turns about their axes."""
+    """Also those that spin freely, which nothing but rounding rotations about their axes."""
     case = cases.case(name)
     mech = without_masses(case.mech, every_link(case.mech) if some == "all" else [(0, "piston")])
     found = verify_states(mech, *(a[::9] for a in (case.T, case.twist, case.acceleration)), engines=[engine])
@@ -205,7 +205,7 @@ def test_a_system_that_exudyn_finds_singular_has_no_answer(monkeypatch, capfd):
 
 
 def quoted_gaps(found):
-    """What the notes say of MuJoCo's soft loops: with its defaults, and with the stiffest."""
+    """Numbers of the notes on MuJoCo's soft loops: with its defaults, and with the stiffest."""
     (note,) = found.comparisons[0].notes
     match = re.search(r"off by up to (\S+) of .* default .* by (\S+) with the stiffest", note)
     return tuple(map(float, match.groups()))
@@ -236,7 +236,7 @@ def test_mujoco_s_own_loops_are_far_off(name):
 
 
 def nearly_dependent(tilt):
-    """Two UPU legs with parallel axes, at an angle: each forbids turns about its direction."""
+    """Two UPU legs with parallel axes, at an angle: each forbids rotations about its direction."""
     tables = pp.load(cases.DATA / "stewart-gough.toml").to_dict()
     tables["legs"] = tables["legs"][:4]
     joint = {"joint": "U", "axis": [1.0, 0.0, 0.0]}
@@ -400,7 +400,7 @@ def test_command_with_integration(run, tmp_path):
 
 
 def test_samples_are_for_the_comparison(run, monkeypatch):
-    """What is integrated is all of the motion."""
+    """All of the motion is integrated."""
     seen = []
     right = pp.verify.integrate
 

@@ -259,7 +259,7 @@ def test_constant_orientation_is_the_meet_of_six_shells(hexapod, upright):
 
 
 def test_orientation_changes_the_shells(hexapod):
-    """The same with a turn: centres B_i - R m_i."""
+    """Reach with a rotation: centres B_i - R m_i."""
     angle = 0.3
     found = pp.workspace(hexapod, ["x", "y", "z"], {"rx": 0.0, "ry": 0.0, "rz": angle}, step=0.05)
     c, s = np.cos(angle), np.sin(angle)

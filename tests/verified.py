@@ -1,4 +1,4 @@
-"""What the tests of all twins use: the quantities that disagree, and faults in a mechanism file's tables."""
+"""Common parts of the tests of all twins: disagreeing quantities, and faults in a mechanism file's tables."""
 
 
 def exceeding(found):

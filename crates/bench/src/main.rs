@@ -1,5 +1,6 @@
-//! What the arithmetic of one state is, and how fast the processor is at it: the counts of each operation for the
-//! published manipulator and the peak rates of multiplications and additions, of divisions and of square roots, as JSON.
+//! Arithmetic of one state and peak rates of the processor: the counts of each operation for the published
+//! manipulator and the peak rates of multiplications and additions, of divisions and of square roots, as
+//! JSON.
 //!
 //! The kernels run with a number that counts. Comparisons, selections, signs and memory are free; a division and a
 //! square root count as one flop each, though they take longer. Checks of the input are not in it.

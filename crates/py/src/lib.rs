@@ -284,15 +284,15 @@ impl PyMechanism {
         arrays(py, table, &batch)
     }
 
-    /// Vector (a twist at o), axis, pitch and point of each principal screw of the freedoms at one pose; none where a leg has no
-    /// direction.
+    /// Vector (a twist at o), axis, pitch and point of each principal screw of the degrees of freedom at one
+    /// pose; none where a leg has no direction.
     fn freedom_screws(&self, poses: Array<'_>) -> PyResult<Option<Vec<ScrewRow>>> {
         let pose = one_pose(&poses)?;
         let found = screw_systems::freedoms(&self.0, &pose);
         Ok(found.map(|all| all.iter().map(|(twist, screw)| screw_row(twist.array(), screw)).collect()))
     }
 
-    /// The same of the wrench of every constraint.
+    /// Vector (a wrench at o), axis, pitch and point of every constraint at one pose.
     fn constraint_screws(&self, poses: Array<'_>) -> PyResult<Vec<ScrewRow>> {
         let pose = one_pose(&poses)?;
         let found = screw_systems::constraints(&self.0, &pose);

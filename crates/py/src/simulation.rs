@@ -27,11 +27,13 @@ fn six(array: &[f64]) -> PyResult<[f64; 6]> {
 }
 
 impl PyChart {
-    /// Coordinates and rates as a place; none where the chart ends.
+    /// Coordinates and rates as a point of the chart; none where it ends.
     fn place(&self, y: &[f64]) -> PyResult<Option<Place>> {
         let d = self.chart.freedoms();
         if y.len() != 2 * d {
-            return Err(PyValueError::new_err("needs one coordinate and one rate for each freedom"));
+            return Err(PyValueError::new_err(
+                "needs one coordinate and one rate for each degree of freedom",
+            ));
         }
         Ok(self.chart.place(self.mech.get().core(), &y[..d], &y[d..]))
     }

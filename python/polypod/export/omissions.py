@@ -1,4 +1,4 @@
-"""What a mechanism file says and a format does not: nothing is left out without a word."""
+"""Contents of a mechanism file that a format cannot hold: nothing is left out without a word."""
 
 from __future__ import annotations
 

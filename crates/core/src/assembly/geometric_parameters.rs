@@ -1,4 +1,5 @@
-//! The numbers of the geometry: points and axes of joints and rods; and mechanisms that vary with one of them \[T56\].
+//! Geometric parameters: points and axes of joints and rods; and mechanisms that vary with one of them, by
+//! dual numbers \[T56\].
 
 use crate::assembly::build;
 use crate::kinematics::idle;
@@ -9,7 +10,7 @@ use crate::model::spec::Axes;
 use crate::number::real::Dual;
 use crate::spatial::Vec3;
 
-/// What has points and axes.
+/// Owner of points and axes: a rod, or a joint of a leg.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Place {
     Joint(usize, Axes),

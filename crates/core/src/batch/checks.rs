@@ -1,4 +1,4 @@
-//! Whether a state is one that the mechanism can be in: the checks that every operation makes of its input.
+//! Checks that every operation makes of its input: pose, legs, limits, constraints, motion.
 
 use super::block::{self, At, Codes};
 use crate::dynamics::forward_dynamics::square;
@@ -93,7 +93,8 @@ pub(super) fn with_legs<V: Lanes>(mech: &Mechanism, pose: &Pose<V>, mut codes: C
     codes
 }
 
-/// The same of one leg, from |N|² \[T5\]; and whether the strut of a slider reaches its rail, not square to it \[T67\].
+/// Whether one leg has a direction and a frame, from |N|² \[T5\], and the strut of a slider reaches its rail,
+/// not perpendicular to it \[T67\].
 #[inline(always)]
 pub(super) fn with_leg<V: Lanes>(
     mech: &Mechanism,
@@ -162,7 +163,7 @@ pub(super) fn forwards<V: Lanes>(mech: &Mechanism, pose: &Pose<V>, mut codes: Co
     codes
 }
 
-/// The same for values, which are lengths; a row that vanishes gives no distance.
+/// Square of the tolerance for constraint values, which are lengths; a row that vanishes gives no distance.
 #[inline(always)]
 fn nearness<V: Lanes>(mech: &Mechanism, square: V) -> V {
     let least = constraint::VANISHING_ROW * CONSTRAINT_TOLERANCE;
@@ -217,7 +218,7 @@ pub(super) fn within_limits<V: Lanes>(mech: &Mechanism, pose: &Pose<V>, codes: C
     within_limits_of(mech, pose, &mut Seen::default(), codes)
 }
 
-/// The same with what has been seen of the legs.
+/// First limit of a joint that a pose breaks, from the cached legs.
 #[inline(always)]
 pub(super) fn within_limits_of<V: Lanes>(
     mech: &Mechanism,
@@ -232,7 +233,8 @@ pub(super) fn within_limits_of<V: Lanes>(
     codes
 }
 
-/// The same of one pose, in the registers of batches: lengths at the very end of a stroke are judged alike everywhere.
+/// Status of one pose by the limits of joints, in the registers of batches: lengths at the very end of a
+/// stroke are judged alike everywhere.
 pub(super) fn limit_status(mech: &Mechanism, pose: &Pose<f64>) -> Status {
     let mut codes = [0.0; WIDTH];
     lanes::dispatch(LimitsOfOne { mech, pose, codes: &mut codes });

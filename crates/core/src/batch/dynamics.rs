@@ -45,8 +45,9 @@ impl Loads<'_> {
     }
 }
 
-/// Active forces of all legs (zero for passive ones), multipliers of the independent constraints and torques of idle freedoms
-/// [Eq. 43] \[T70\]. Where actuators are redundant, the forces nearest to the preferred ones of all legs, zero for none \[T72\].
+/// Active forces of all legs (zero for passive ones), multipliers of the independent constraints and torques
+/// of local degrees of freedom [Eq. 43] \[T70\]. Where actuators are redundant, the forces nearest to the
+/// preferred ones of all legs, zero for none \[T72\].
 #[must_use]
 pub fn inverse_dynamics(
     mech: &Mechanism,

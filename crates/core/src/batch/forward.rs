@@ -130,7 +130,7 @@ fn check_found(mech: &Mechanism, asked: &[f64], pose: &Pose<f64>) -> Status {
     block::read(checks(mech, [(asked, pose)])[0]).0
 }
 
-/// The same of at most [`WIDTH`] lengths and poses, as codes.
+/// Status codes of at most [`WIDTH`] lengths and poses that were found for them.
 fn checks<'a>(mech: &Mechanism, found: impl IntoIterator<Item = (&'a [f64], &'a Pose<f64>)>) -> Row {
     let (mut poses, mut codes) = ([[0.0; WIDTH]; 12], [0.0; WIDTH]);
     let mut numbers = vec![[0.0; WIDTH]; mech.actuated().count()];

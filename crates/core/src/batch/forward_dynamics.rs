@@ -76,7 +76,7 @@ impl Working<2> for ForwardDynamics<'_> {
     }
 }
 
-/// What the equations of motion are written in: twists, or given coordinates of a set.
+/// Velocities of the equations of motion: twists, or rates of given coordinates of a set.
 #[derive(Clone, Debug)]
 pub enum Space {
     Platform,

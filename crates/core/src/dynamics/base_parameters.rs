@@ -1,4 +1,4 @@
-//! The minimal set of inertial parameters: those combinations that active forces can tell apart \[T58\].
+//! Base inertial parameters: the minimal set of combinations that determine the active forces \[T58\].
 
 use nalgebra::{DMatrix, DVector};
 
@@ -10,7 +10,8 @@ use crate::model::mechanism::Mechanism;
 use crate::numerics::random::Draw;
 use crate::spatial::{Acceleration, Mat3, Motion, Pose, Twist};
 
-/// What is left of a column after all before it, relative to itself, where it counts as dependent on them.
+/// Relative remainder of a column after orthogonalisation against all before it, below which it counts as
+/// dependent.
 pub const DEPENDENT: f64 = 1e-8;
 
 /// A coefficient below this, in pure numbers, is the rounding of zero.
@@ -19,7 +20,7 @@ const ZERO: f64 = 1e-9;
 /// Equations for each parameter.
 const SURPLUS: usize = 3;
 
-/// How far from home poses are drawn: of the characteristic length and of a radian.
+/// Spread about home of the random poses: in characteristic lengths and radians.
 const SPREAD: f64 = 0.5;
 
 /// Pivot ratio of the Jacobian below which a drawn pose is passed over: forces there are large and say little.
@@ -35,11 +36,12 @@ pub struct BaseParameters {
     pub columns: Vec<usize>,
     /// One row for each of them, one column for each parameter.
     pub combination: DMatrix<f64>,
-    /// What was left of each column, relative to itself, after those kept before it: shows how clear the rank is.
+    /// Relative remainder of each column after orthogonalisation against those kept before it: shows how
+    /// clear the rank is.
     pub remainders: Vec<f64>,
 }
 
-/// The base parameters from the regressors of random states; none if too few states could be drawn.
+/// Base parameters from the regressors of random states; none if too few states could be drawn.
 #[must_use]
 pub fn base_parameters(mech: &Mechanism) -> Option<BaseParameters> {
     let regressor = Regressor::new(mech);

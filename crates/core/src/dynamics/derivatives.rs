@@ -1,8 +1,8 @@
-//! Derivatives of inverse dynamics by the motion and by the geometry: the same equations with dual numbers, one
-//! direction at a time \[T56\].
+//! Derivatives of inverse dynamics by the motion and by the geometry, by dual numbers, one direction at a
+//! time \[T56\].
 //!
-//! Forces are the solution of a linear balance, so that what is differentiated is the balance with the forces kept:
-//! what it is off by, per unit of the direction, the forces must answer.
+//! Forces F solve the linear balance W + Jᵀ F = 0, which is differentiated implicitly: Jᵀ δF = -(δW + δJᵀ F),
+//! with W and J evaluated in dual numbers and F kept.
 
 use crate::assembly::geometric_parameters::{self, Parameter};
 use crate::dynamics::force_balance::UnitForceResponse;
@@ -16,8 +16,8 @@ use crate::number::lanes::Lanes;
 use crate::number::real::{Constant, Dual, Jet, Real};
 use crate::spatial::{Acceleration, Motion, Pose, Twist, Vec3, Wrench};
 
-/// Numbers that a motion is varied in: six of the pose (o moves, and the platform turns about axes of the base through
-/// o), six of the twist, six of the acceleration.
+/// Numbers that a motion is varied in: six of the pose (o moves, and the platform rotates about axes of the
+/// base through o), six of the twist, six of the acceleration.
 pub const DIRECTIONS: usize = 18;
 
 /// Inverse dynamics at a state, solved. Forces and multipliers, or how they change, stand in the order of J's rows.
@@ -74,7 +74,7 @@ impl<'a, 'b, V: Lanes> Imbalance<'a, 'b, V> {
         self.wrench = self.wrench + sum;
     }
 
-    /// Adds what an idle freedom's or a constraint's row does, its multiplier kept.
+    /// Adds what a local degree of freedom's or a constraint's row does, its multiplier kept.
     #[inline(always)]
     fn add_row<S: Constant<Dual<V>>>(&mut self, row: Row<'_, S>, number: usize, pose: &Pose<Dual<V>>) {
         let unit = row.wrench(pose);
@@ -139,7 +139,7 @@ fn part<V: Lanes>(step: &[V; DIRECTIONS], k: usize) -> Vec3<V> {
 #[inline(always)]
 fn step_of<V: Lanes>(rates: &Pose<Jet<V>>, varied: &Variation<V>) -> [V; DIRECTIONS] {
     let [now, moved] = [parts_of(rates), varied.pose];
-    // ω = ½ Σ x × x' over the columns of R, ε = ½ Σ x × x'' [T19]; a turn δθ makes δx = δθ × x.
+    // ω = ½ Σ x × x' over the columns of R, ε = ½ Σ x × x'' [T19]; a rotation δθ makes δx = δθ × x.
     let (mut turn, mut omega, mut eps) = (Vec3::zero(), Vec3::zero(), Vec3::zero());
     for k in 0..3 {
         turn = turn + now[0][k].cross(moved[0][k]);
@@ -213,7 +213,7 @@ impl<V: Lanes> Coordinates<V> {
         Coordinates { q, pose: platform.jets(), following: Following::at(&still.mech, &still.set, &q, given) }
     }
 
-    /// What varies with a number of the set.
+    /// Variation of pose, rates and constraints with a number of the coordinate set.
     #[inline(always)]
     pub(crate) fn varied(&self, still: &Varied, number: usize) -> Variation<V> {
         V::apart(Varying { mech: &still.mech, set: &still.set, q: &self.q, number: Some(number) })
@@ -235,13 +235,13 @@ impl<V: Lanes> Coordinates<V> {
         }
     }
 
-    /// How the motion varies then.
+    /// Variation of the motion, with the dependent coordinates.
     #[inline(always)]
     pub(crate) fn step(&self, varied: &Variation<V>, order: usize) -> [V; DIRECTIONS] {
         step_of(&self.pose, &self.following.with(varied.by_rate(order)))
     }
 
-    /// How the motion follows a number of the geometry.
+    /// Variation of the motion with a number of the geometry, coordinates kept.
     #[inline(always)]
     pub(crate) fn following_geometry(&self, by: &Varied) -> [V; DIRECTIONS] {
         if !by.moves {

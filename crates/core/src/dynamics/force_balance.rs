@@ -13,7 +13,8 @@ use crate::spatial::{Motion, Pose, Twist, Wrench};
 /// Room for the balance of one state after another.
 pub struct ForceSolver<V> {
     pub numbers: RowNumbers,
-    /// For each row of J: active forces, torques of idle freedoms, multipliers of the independent constraints.
+    /// For each row of J: active forces, torques of local degrees of freedom, multipliers of the independent
+    /// constraints.
     pub forces: Vec<V>,
     /// Active forces to be near to, where actuators are redundant; none for zeros.
     pub preferred: Vec<V>,

@@ -1,4 +1,5 @@
-//! Reactions of all joints: what each makes the link on its base side do to the link on its platform side \[T44\]-\[T48\].
+//! Reactions of all joints: the wrench of the link on the base's side on the link on the platform's side
+//! \[T44\]-\[T48\].
 //!
 //! The wrenches of the legs on the platform are the unknowns; every other reaction follows from them link by link,
 //! from the platform down. What they must satisfy is that no joint carries what it leaves free, and that the platform is
@@ -19,7 +20,7 @@ pub struct Joint {
     pub name: String,
     /// The link on the base's side, and that on the platform's.
     pub links: [String; 2],
-    /// What it leaves free: components, in joint axes, force before torque, of a reaction that it cannot carry.
+    /// Components of the reaction that the joint cannot transmit, in joint axes, force before torque.
     pub(crate) free: Vec<usize>,
 }
 
@@ -74,7 +75,7 @@ impl<T: Real> Place<T> {
     }
 }
 
-/// Where all joints are, in the order of [`joints`].
+/// Points and axes of all joints, in the order of [`joints`].
 #[must_use]
 pub fn places<T: Real>(mech: &Mechanism, pose: &Pose<T>) -> Vec<Place<T>> {
     let mut all = vec![Place::nowhere(); mech.rods.len() + 3 * mech.legs.len()];
@@ -222,8 +223,8 @@ pub(crate) fn put_reactions<T: Real>(
     }
 }
 
-/// What the reactions must make zero: components that joints do not carry, then the platform's balance at o; torques divided
-/// by the characteristic length \[T46\].
+/// Residual of the equilibrium equations: components that joints do not transmit, then the platform's balance
+/// at o; torques divided by the characteristic length \[T46\].
 #[must_use]
 pub fn unbalanced<T: Real>(
     mech: &Mechanism,
@@ -276,8 +277,8 @@ pub(crate) fn pure<T: Real>(w: Wrench<T>, length: f64) -> Wrench<T> {
     Wrench::new(w.force, w.torque.scale(1.0 / length))
 }
 
-/// What the legs that constrain the platform do to it at o beyond their active forces \[T48\]. No self-stress changes
-/// the sum.
+/// Constraint wrench W_c = Σ[(F, T + e×F) - f (δ, e×δ)] of the constraining legs on the platform at o
+/// \[T48\]. No self-stress changes the sum.
 #[inline(always)]
 pub(crate) fn constraint_wrench<T: Real>(
     mech: &Mechanism,

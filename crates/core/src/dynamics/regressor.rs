@@ -44,7 +44,7 @@ const ENTRIES: [(usize, usize); 6] = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2
 /// Each number of a body by itself.
 const EACH: [&[usize]; NUMBERS] = [&[0], &[1], &[2], &[3], &[4], &[5], &[6], &[7], &[8], &[9]];
 
-/// What a body has that is symmetric about its leg, as it must be where the leg spins freely: I_xx and I_zz are one.
+/// Parameters of a body symmetric about its leg, as it must be where the leg spins freely: I_xx = I_zz.
 const SYMMETRIC: [&[usize]; 4] = [&[0], &[2], &[4, 9], &[7]];
 
 /// One inertial parameter of a link.
@@ -191,7 +191,7 @@ impl Regressor {
         Regressor { parameters, units, by_bodies }
     }
 
-    /// For each parameter the active forces and multipliers that its unit asks for: the columns of Y \[T57\].
+    /// For each parameter the active forces and multipliers for a unit of it: the columns of Y \[T57\].
     pub fn columns(&self, mech: &Mechanism, platform: &Motion<f64>) -> Vec<Vec<f64>> {
         let legs: Vec<_> = mech.legs.iter().map(|leg| leg::state(leg, platform)).collect();
         let mut response = UnitForceResponse::new(mech);
@@ -204,7 +204,7 @@ impl Regressor {
         (0..self.parameters.len()).map(column).collect()
     }
 
-    /// What a unit of the k-th parameter puts on the platform.
+    /// Wrench on the platform of a unit of the k-th parameter.
     #[inline(always)]
     pub(crate) fn wrench<T: Real>(
         &self,
@@ -234,7 +234,7 @@ impl Regressor {
         sum
     }
 
-    /// What load and damping put on the platform.
+    /// Wrench of load and damping on the platform, divided by the efficiency.
     #[inline(always)]
     pub(crate) fn rest<T: Real>(mech: &Mechanism, twist: &Twist<T>, load: Wrench<T>) -> Wrench<T> {
         (load + inverse_dynamics::damping_wrench(mech, twist)) * T::lit(1.0 / mech.efficiency)

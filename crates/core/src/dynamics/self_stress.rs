@@ -1,5 +1,6 @@
-//! Reactions where several will do: all that balance the links, the self-stresses that they differ by, and the two choices
-//! among them \[T46\] \[T47\]. For one state or for one in each lane, in room that is made once.
+//! Statically indeterminate reactions: a particular solution of the equilibrium of all links, the
+//! self-stresses (null space), and the two choices among the solutions \[T46\] \[T47\]. For one state or for
+//! one in each lane, in memory allocated once.
 
 use crate::dynamics::force_balance::ForceSolver;
 use crate::dynamics::joint_reactions::{
@@ -17,7 +18,7 @@ use crate::spatial::{Motion, Pose, Vec3, Wrench};
 /// Least to greatest singular value of the platform's and the rods' balances below which the pose is singular.
 const SINGULAR: f64 = 1e-12;
 
-/// What may be left of the balances, relative to the reactions.
+/// Largest residual of the equilibrium equations, relative to the reactions.
 const RESIDUAL: f64 = 1e-9;
 
 /// A component (torques divided by Λ) that no self-stress of size one changes by more is determinate: poses may miss their
@@ -28,7 +29,7 @@ const OPEN: f64 = 1e-6;
 /// is rounding.
 const SQUARE: f64 = 1e-15;
 
-/// Far more turns of all pairs than any self-stresses need.
+/// Far more rotations of all pairs than any self-stresses need.
 const SWEEPS: usize = 60;
 
 /// Reactions of all joints in the order of [`joints`](crate::dynamics::joint_reactions::joints), each at its joint's point in base axes.
@@ -96,10 +97,11 @@ pub(crate) struct Solver<'a, V> {
     pub constraint: Wrench<V>,
 }
 
-/// What a leg can do to the platform, at its b in base axes, torques divided by the characteristic length: one wrench that
-/// balances what is given in the leg, and those that its joints carry without any.
+/// Wrenches of a leg on the platform, at its b in base axes, torques divided by the characteristic length:
+/// the particular one that balances the given forces of the leg, and a basis of those that its joints
+/// transmit without any.
 struct LegBalance<V> {
-    /// What its joints leave free: the joint, from base to platform, and the component.
+    /// Components that its joints cannot transmit: the joint, from base to platform, and the component.
     free: Vec<(usize, usize)>,
     system: Householder<V>,
     /// The first of its columns in the whole.
@@ -118,7 +120,7 @@ impl<V: Lanes> LegBalance<V> {
             .flat_map(|(j, joint)| joint.free.iter().map(move |&k| (j, k)))
             .collect();
         if joints[0].kind == JointKind::Spherical.letter() && joints[2].kind == joints[0].kind {
-            // Turning about itself is free at either end, and is one motion: neither end can hold it.
+            // Rotation about itself is free at either end, and is one motion: neither end can hold it.
             free.retain(|&at| at != (0, 4));
         }
         if pushed {
@@ -194,7 +196,8 @@ impl<'a, V: Lanes> Solver<'a, V> {
             count += leg.carried.len();
             legs.push(leg);
         }
-        // Given forces of all actuators hold the platform in all its freedoms, the others in the idle ones.
+        // Given forces of all actuators hold the platform in all its degrees of freedom, the others in the
+        // idle ones.
         let props = if mech.is_redundant() { mech.dof() } else { mech.idle.len() };
         count += props;
         let (all, rows) = (joints.len(), 6 + rods);
@@ -233,8 +236,8 @@ impl<'a, V: Lanes> Solver<'a, V> {
             }
             return self.solve_given(pose);
         };
-        // Redundant actuators push with their least forces \[T72\], which leave the platform's freedoms nothing to hold: what
-        // the props hold shows as an error.
+        // Redundant actuators push with their least forces \[T72\], which leave the platform's degrees of
+        // freedom nothing to hold: what the props hold shows as an error.
         let regular = forces.solve_motion(mech, platform, load);
         let mut row = 0;
         for (leg, balance) in mech.legs.iter().zip(&mut self.legs) {
@@ -286,7 +289,7 @@ impl<'a, V: Lanes> Solver<'a, V> {
         holds
     }
 
-    /// What the props of idle freedoms do is given from now on.
+    /// Takes the torques of the fictitious supports of local degrees of freedom as given from now on.
     #[inline(always)]
     fn add_idle_torques(&mut self) {
         let (length, first) = (self.mech.characteristic_length, self.props_from());
@@ -296,7 +299,7 @@ impl<'a, V: Lanes> Solver<'a, V> {
         }
     }
 
-    /// The column of the first prop.
+    /// The column of the first fictitious support.
     #[inline(always)]
     fn props_from(&self) -> usize {
         self.legs.last().map_or(0, |leg| leg.first + leg.carried.len())
@@ -432,7 +435,7 @@ struct Choice<V> {
     /// How many joints there are, and which of them are universal.
     joints: usize,
     universal: Vec<usize>,
-    /// What couples are divided by, and torques in the least sum of squares, m.
+    /// Length that divides couples, and torques in the sum of squares that is minimised, m.
     length: f64,
     scale: f64,
     /// The reactions of all joints, of one self-stress after the other.
@@ -468,7 +471,8 @@ impl<V: Lanes> Choice<V> {
         &self.stresses[k * self.joints..(k + 1) * self.joints]
     }
 
-    /// Turns the self-stresses into others, orthonormal as they are, whose couples are square to one another.
+    /// Rotates the self-stresses into others, orthonormal as they are, whose couples are perpendicular to one
+    /// another.
     #[inline(always)]
     fn turn(&mut self, places: &[Place<V>]) {
         let (width, mut all) = (self.universal.len(), V::zero());
@@ -505,7 +509,7 @@ impl<V: Lanes> Choice<V> {
         sum
     }
 
-    /// Turns a pair where its couples are not square yet, and tells where.
+    /// Rotates a pair where its couples are not perpendicular yet, and tells where.
     #[inline(always)]
     fn make_square(&mut self, i: usize, j: usize, all: V) -> V {
         let (a, b) = (self.product_of_couples(i, i), self.product_of_couples(j, j));
@@ -513,7 +517,7 @@ impl<V: Lanes> Choice<V> {
         let counts = a.least(b).greater(all.scale(SQUARE * SQUARE));
         let cosine = V::select(counts, product * product, V::zero());
         let turns = cosine.greater((a * b).scale(SQUARE * SQUARE));
-        // The lesser turn that does it: t = tan of its angle, t² + 2 ζ t = 1.
+        // The smaller rotation that does it: t = tan of its angle, t² + 2 ζ t = 1.
         let zeta = (b - a) / (product + product);
         let t = zeta.signum() / (zeta.abs() + zeta.mul_add(zeta, V::one()).sqrt());
         let cos = V::one() / t.mul_add(t, V::one()).sqrt();

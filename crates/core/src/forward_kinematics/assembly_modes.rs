@@ -1,8 +1,9 @@
 //! All assembly modes: every real pose with given leg lengths \[T28\], \[T29\], \[T75\].
 //!
-//! The equations of [`forward`](crate::forward_kinematics::newton) are polynomials, so that over the complex numbers they have the same
-//! number of solutions for almost all lengths. All of them are found once for generic complex lengths; from there they
-//! are followed along a path of lengths to the ones that are asked for, and the real ones kept.
+//! The equations of [`forward`](crate::forward_kinematics::newton) are polynomials, so that over the complex
+//! numbers they have the same number of solutions for almost all lengths. All of them are found once for
+//! generic complex lengths; from there they are followed along a path of lengths to the given ones, and the
+//! real ones kept.
 
 use crate::forward_kinematics::gauss_newton;
 use crate::forward_kinematics::homotopy::{C, End, Lengths, Path, modulus};
@@ -29,13 +30,14 @@ const CLOSE: f64 = 1e-4;
 /// Distance, as a pure number, below which two regular solutions are one.
 const SAME: f64 = 1e-7;
 
-/// The same for solutions that meet: they are known to the square root of rounding.
+/// Distance, as a pure number, below which two solutions that meet are one: they are known to the square root
+/// of rounding.
 const MEETING: f64 = 1e-5;
 
 /// Imaginary part, as a pure number, of a regular solution that is rounding of zero.
 const IMAGINARY: f64 = 1e-8;
 
-/// The same where solutions meet; whether it is real is decided by its residual.
+/// Imaginary part, as a pure number, of solutions that meet; their residual decides whether they are real.
 const IMAGINARY_MEETING: f64 = 1e-3;
 
 /// Residual of a real pose, relative to the longest leg, that is rounding of zero.
@@ -59,7 +61,7 @@ const MOST_ROUNDS: usize = 20;
 pub struct Start {
     asked: [Asked<C>; 6],
     poses: Vec<Pose<C>>,
-    /// Which of the poses are their own images by the reflection: those of a platform in the base plane.
+    /// Marks of the poses that are their own mirror images: those of a platform in the base plane.
     own_images: Vec<bool>,
     mirror: Option<Mirror>,
     /// With as many of its legs actuated as it takes, where there are more.
@@ -101,8 +103,8 @@ impl Start {
     }
 }
 
-/// The reflection of a mechanism whose base joints lie in one plane and whose platform joints lie in another: it turns
-/// a pose above the base into one below it with the same leg lengths.
+/// The reflection of a mechanism whose base joints lie in one plane and whose platform joints lie in another:
+/// it maps a pose above the base to one below it with the same leg lengths.
 #[derive(Clone, Copy, Debug)]
 struct Mirror {
     base_normal: Vec3<f64>,
@@ -175,7 +177,7 @@ pub fn start(mech: &Mechanism) -> Option<Start> {
     search(mech, &mut Draw(0x9E37_79B9_7F4A_7C15))
 }
 
-/// The same for a mechanism without redundant legs, by the given random numbers.
+/// Generic solutions of a mechanism without redundant legs, by the given random numbers.
 fn search(mech: &Mechanism, draw: &mut Draw) -> Option<Start> {
     let asked = generic(mech, draw);
     let mut result =
@@ -195,7 +197,7 @@ fn search(mech: &Mechanism, draw: &mut Draw) -> Option<Start> {
     None
 }
 
-/// What the home pose meets.
+/// Target of a leg at the home pose.
 fn at_home(mech: &Mechanism, leg: &Leg) -> Asked<C> {
     let Asked { place, square } = Asked::of(leg, leg.drive.number(leg::position(leg, &mech.home).coordinate));
     Asked { place: C::lit(place), square: C::lit(square) }
@@ -227,7 +229,7 @@ fn distance(mech: &Mechanism, a: &Pose<C>, b: &Pose<C>) -> f64 {
     (turned / (size * size)).max(moved / size)
 }
 
-/// Where an idle line is at a pose, seen from the other body: its direction and its point.
+/// Direction and point of the line of a local degree of freedom at a pose, seen from the other body.
 fn line<T: Real>(idle: &Idle, pose: &Pose<T>) -> (Vec3<T>, Vec3<T>) {
     let (axis, point) = (Vec3::lift(idle.axis), Vec3::lift(idle.point));
     match idle.side {
@@ -236,14 +238,15 @@ fn line<T: Real>(idle: &Idle, pose: &Pose<T>) -> (Vec3<T>, Vec3<T>) {
     }
 }
 
-/// The same distance of what an idle spin leaves: of the line \[T71\].
+/// Distance of two poses apart from the spin of a local degree of freedom: that of its line \[T71\].
 fn distance_of_lines(mech: &Mechanism, idle: &Idle, a: &Pose<C>, b: &Pose<C>) -> f64 {
     let ((u, p), (v, q)) = (line(idle, a), line(idle, b));
     let size = modulus(u).max(1.0);
     (modulus(u - v) / (size * size)).max(modulus(p - q) / (mech.characteristic_length + modulus(p)) / size)
 }
 
-/// The pose with the idle line where it is, and the spin that is the shortest turn from home: a real one where the line is real.
+/// The pose with the idle line where it is, and the spin that is the shortest rotation from home: a real one
+/// where the line is real.
 fn unspun(mech: &Mechanism, pose: &Pose<C>) -> Pose<C> {
     let [idle] = &mech.idle[..] else { return *pose };
     let real = |a: Vec3<C>| a.map(|e| e.re);
@@ -268,7 +271,7 @@ fn unspun(mech: &Mechanism, pose: &Pose<C>) -> Pose<C> {
     found
 }
 
-/// A real pose with the lengths that were asked for.
+/// A real pose with the given lengths.
 #[derive(Clone, Copy, Debug)]
 pub struct Mode {
     pub pose: Pose<f64>,
@@ -358,7 +361,7 @@ pub fn assembly_modes(mech: &Mechanism, start: &Start, lengths: &[f64]) -> Modes
     Modes { modes, status }
 }
 
-/// How modes are ordered: by height, and equally high ones by the rest of the pose.
+/// Sort key of assembly modes: by height, then by the rest of the pose.
 fn order(mech: &Mechanism, pose: &Pose<f64>, up: Vec3<f64>) -> [i64; 13] {
     let o = pose.o * (1.0 / mech.characteristic_length);
     let mut numbers =

@@ -1,5 +1,5 @@
-//! Forward kinematics where lengths are not six equations with one solution nearby: legs that contradict one another unless
-//! they agree \[T73\], and designs that are singular at every pose. By Gauss and Newton's method, with the rows themselves.
+//! Gauss-Newton forward kinematics for over-determined mechanisms, whose lengths must be consistent \[T73\],
+//! and for designs that are singular at every pose. With the rows themselves, not their products.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -27,7 +27,7 @@ const STEPS: u32 = 200;
 /// their constraints by.
 const AGREEMENT: f64 = 1e-6;
 
-/// The same of a constraint.
+/// Largest residual of a constraint, as a pure number.
 const KEPT: f64 = 1e-11;
 
 /// Steps below this size are made whatever they do: the iteration contracts there, to rounding if the legs agree, and if they
@@ -147,7 +147,8 @@ impl Misses<f64> {
         let legs = DVector::from_column_slice(&errors.legs);
         let others = DVector::from_column_slice(&errors.others);
         let of_legs = DMatrix::from_fn(legs.len(), 6, |i, j| errors.rows[i][j]);
-        // First what the others ask for, then what the legs ask for within that; each of least size.
+        // First the step that the other rows require, then that of the legs within their null space; each of
+        // least norm.
         let rest: Vec<[f64; 6]> = rows::others(mech).map(|row| row.pure(pose, scale)).collect();
         let held = Svd::of(&DMatrix::from_fn(others.len(), 6, |i, j| rest[i][j]))?;
         let (first, rank) = least(&held, &others);

@@ -1,4 +1,5 @@
-//! Paths of complex solutions as equations change, such as squared leg lengths, several side by side \[T29\].
+//! Homotopy continuation: paths of complex solutions while the equations change, such as squared leg lengths,
+//! several side by side; Runge-Kutta predictor, Newton corrector \[T29\].
 
 use crate::forward_kinematics::newton::{Asked, FOLD_PIVOTS, System, system};
 use crate::kinematics::leg;
@@ -15,10 +16,11 @@ pub type C = Complex<f64>;
 /// Coordinates, as pure numbers, of a pose beyond which a path is taken to go to infinity: no real pose is there.
 pub const INFINITE: f64 = 1e7;
 
-/// The same for a path that cannot be followed further in double precision.
+/// Coordinates, as pure numbers, beyond which a path that cannot be followed further in double precision is
+/// taken to go to infinity.
 const FAR: f64 = 300.0;
 
-/// The same below which a pose may be a real one.
+/// Coordinates, as pure numbers, below which a pose may be a real one.
 const NEARBY: f64 = 100.0;
 
 /// Share of a path that is tried first.
@@ -36,13 +38,13 @@ const LAST_STEPS: usize = 40;
 /// Size of a Newton step, as a pure number, from which the next one is rounding.
 const ROUNDING: f64 = 1e-14;
 
-/// The same by which it has converged quadratically.
+/// Size of a Newton step, as a pure number, from which the iteration counts as quadratically converged.
 const CONVERGED: f64 = 1e-9;
 
-/// The same that no step on the way need fall below.
+/// Size of a Newton step, as a pure number, that is small enough on the way.
 const CLOSE: f64 = 1e-8;
 
-/// How a path ends.
+/// End of a path.
 #[derive(Clone, Copy, Debug)]
 pub enum End {
     Regular(Pose<C>),
@@ -71,11 +73,12 @@ pub trait Family {
     /// Whether solutions that differ by an idle spin are one \[T71\].
     fn spins(&self) -> bool;
 
-    /// The equations at a place, and the rates at which their residuals fall there. Must be `#[inline(always)]`.
+    /// The equations at a point of the path, and the rates at which their residuals fall there. Must be
+    /// `#[inline(always)]`.
     fn at<V: Lanes>(&self, place: &Place<Complex<V>>, t: V) -> (System<Complex<V>>, [Complex<V>; 6]);
 }
 
-/// What is asked of the legs along a straight path.
+/// Targets of the legs along a straight path of squared lengths.
 #[derive(Clone, Copy, Debug)]
 pub struct Lengths<'a> {
     pub mech: &'a Mechanism,
@@ -268,7 +271,7 @@ impl<F: Family> Path<F> {
         sum
     }
 
-    /// What the path comes to where it cannot be followed further, or paths seem to meet.
+    /// End of a path that cannot be followed further, or of paths that seem to meet.
     fn end(&self, who: &Traveller, place: &Place<C>) -> End {
         let mech = self.family.mech();
         let size = place.size(mech);
@@ -292,7 +295,7 @@ impl<F: Family> Path<F> {
         if regular { End::Regular(place.pose()) } else { End::Singular(place.pose()) }
     }
 
-    /// Newton steps and rates at places.
+    /// Newton steps and rates at points.
     fn evaluate(&self, place: &Block, t: &Row, result: &mut Evaluated) {
         lanes::dispatch(Evaluation { family: &self.family, place, t, result });
     }
@@ -324,7 +327,7 @@ impl<T: Real> Place<T> {
         Pose { rotation, o: self.o }
     }
 
-    /// The change of the place along (v/Λ, ω): `q' = ω q/2`.
+    /// The change of the point along (v/Λ, ω): `q' = ω q/2`.
     #[inline(always)]
     pub(crate) fn along(&self, mech: &Mechanism, x: &[T; 6]) -> Self {
         let [w, i, j, k] = self.q;
@@ -358,8 +361,8 @@ impl Place<C> {
         Place { q: products[largest].map(|p| p * share), o: pose.o }
     }
 
-    /// The place after that imaginary idle spin which makes the quaternion least: spins are no part of a solution, and
-    /// imaginary ones let it grow without bounds \[T71\].
+    /// The point after that imaginary idle spin which makes the quaternion least: spins are no part of a
+    /// solution, and imaginary ones let it grow without bounds \[T71\].
     fn unspun(self, mech: &Mechanism) -> Self {
         let [idle] = &mech.idle[..] else { return self };
         let [w, x, y, z] = self.q;
@@ -377,7 +380,7 @@ impl Place<C> {
         }
         let [first, second] = parts;
         let q = std::array::from_fn(|k| first[k].scale(share) + second[k].scale(1.0 / share));
-        // The line stays where it is: o turns about it.
+        // The line stays where it is: o rotates about it.
         let (before, after) = (self.pose(), Place { q, ..self }.pose());
         let point = Vec3::lift(idle.point);
         let o = match idle.side {
@@ -458,7 +461,7 @@ fn copy(from: &Block, to: &mut Block, k: usize) {
     }
 }
 
-/// Newton steps at places and their sizes, and the rates of the places along the path.
+/// Newton steps at points and their sizes, and the rates of the points along the path.
 #[derive(Clone, Copy, Debug, Default)]
 struct Evaluated {
     correction: Block,
@@ -612,7 +615,7 @@ mod tests {
             let products = pose.rotation.transpose() * pose.rotation;
             assert!(modulus(products.0[1] - Vec3::lift(Vec3::Y)) < 1e-11);
         }
-        // Unit quaternion of a turn by 0.6 about z, twice as large.
+        // Unit quaternion of a rotation by 0.6 about z, twice as large.
         let (s, c) = 0.3_f64.sin_cos();
         let place = Place { q: [2.0 * c, 0.0, 0.0, 2.0 * s].map(C::lit), o: Vec3::zero() };
         let turned = Mat3::from_rotation_vector(Vec3::Z * 0.6);

@@ -32,7 +32,7 @@ pub(crate) const PIECE_STEPS: u32 = 12;
 /// Shortest piece of the path: where shorter ones would be needed, its assembly mode ends.
 const SHORTEST_PIECE: f64 = 1e-6;
 
-/// The same after an iteration that has converged.
+/// Largest residual, as a pure number, that still counts as rounding after convergence.
 const MOST_ROUNDING: f64 = 2e-12;
 
 /// Longest Newton step: half a radian, or half a characteristic length.
@@ -48,8 +48,8 @@ const CLEARLY: f64 = 0.25;
 /// of rounding.
 pub const FOLD_PIVOTS: f64 = 1e-5;
 
-/// What is asked of an actuated leg: where its foot is on the rail (zero for a telescopic leg, whose foot is B), and the
-/// square of the distance from there to b \[T25\] \[T69\].
+/// Target of an actuated leg: the position of its foot on the rail (zero for a telescopic leg, whose foot is
+/// B), and the squared distance from there to b \[T25\] \[T69\].
 #[derive(Clone, Copy, Debug)]
 pub struct Asked<T> {
     pub place: T,
@@ -70,7 +70,7 @@ impl<T: Real> Asked<T> {
         Asked { place: T::zero(), square: T::zero() }
     }
 
-    /// r from the foot that is asked for, given that from B.
+    /// r from the given foot, from r of B.
     #[inline(always)]
     pub fn vector(&self, leg: &Leg, r: Vec3<T>) -> Vec3<T> {
         leg.drive.vector(r, self.place)
@@ -125,7 +125,8 @@ impl<T: Real> System<T> {
     }
 }
 
-/// What varies of an actuated leg, in the order of the equations: its squared length, or the place of its carriage.
+/// Varying number of each actuated leg, in the order of the equations: its squared length, or the position of
+/// its carriage.
 #[must_use]
 pub fn numbers(mech: &Mechanism, coordinates: &[f64]) -> [f64; 6] {
     let mut numbers = [0.0; 6];
@@ -135,7 +136,7 @@ pub fn numbers(mech: &Mechanism, coordinates: &[f64]) -> [f64; 6] {
     numbers
 }
 
-/// What is asked of the actuated legs, at most six.
+/// Targets of the actuated legs, at most six.
 #[must_use]
 pub fn asked(mech: &Mechanism, coordinates: &[f64]) -> [Asked<f64>; 6] {
     let mut asked = [Asked::none(); 6];
@@ -145,7 +146,7 @@ pub fn asked(mech: &Mechanism, coordinates: &[f64]) -> [Asked<f64>; 6] {
     asked
 }
 
-/// The same, however many they are.
+/// Targets of the actuated legs, however many they are.
 pub fn asked_of_all(mech: &Mechanism, coordinates: &[f64]) -> impl Iterator<Item = Asked<f64>> {
     mech.actuated().zip(coordinates).map(|((_, leg), &q)| Asked::of(leg, leg.drive.number(q)))
 }
@@ -194,7 +195,7 @@ pub(crate) fn size(x: &[f64; 6]) -> f64 {
     x.iter().map(|e| e * e).sum::<f64>().sqrt()
 }
 
-/// What an iteration came to.
+/// Result of an iteration.
 #[derive(Clone, Copy, Debug)]
 pub struct Found {
     pub pose: Pose<f64>,

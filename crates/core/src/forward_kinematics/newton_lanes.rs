@@ -1,5 +1,6 @@
-//! Forward kinematics of several states side by side, one in each lane: what [`forward`](crate::forward_kinematics::newton) does with one,
-//! where it gets by with one piece of the path. The other states are told apart by masks and left to it.
+//! Forward kinematics of several states side by side, one in each lane:
+//! [`forward`](crate::forward_kinematics::newton) as far as one piece of the path is enough. The other states
+//! are masked out and left to it.
 
 use crate::forward_kinematics::newton::{
     Asked, CONTRACTION, FOLD_PIVOTS, Found, LONGEST_STEP, PIECE_STEPS, ROUNDING, SMALL_STEP, System,
@@ -91,7 +92,7 @@ pub(crate) struct Piece<V> {
     sign: V,
 }
 
-/// What may have come of a piece, as numbers: it goes on, has arrived, or is left as too long, for it contracts too
+/// State of a piece of the path, as numbers: going on, arrived, or left as too long, because it contracts too
 /// little or changes the sign of the determinant.
 pub(crate) const GOING: f64 = 0.0;
 pub(crate) const ARRIVED: f64 = 1.0;
@@ -118,8 +119,9 @@ impl<V: Lanes> Piece<V> {
         self.sign.store(&mut sign[k..]);
     }
 
-    /// What a Newton step, judged by its size and by the sign of the determinant before it, makes of the piece, and
-    /// where it is to be made; as [`continuation`](crate::forward_kinematics::newton::continuation) does.
+    /// State of the piece after a Newton step, judged by its size and by the sign of the determinant before
+    /// it, and the lanes in which the step is to be made; as
+    /// [`continuation`](crate::forward_kinematics::newton::continuation) does.
     #[inline(always)]
     pub(crate) fn judge(&mut self, size: V, sign: V) -> (V, V::Mask) {
         let (no, yes) = (V::zero(), V::one());
@@ -176,7 +178,7 @@ impl Lane {
         made
     }
 
-    /// What it has come to, by way of one state alone where it has left the others.
+    /// Result of a state, computed alone where it has left the others.
     fn found(
         &self,
         mech: &Mechanism,

@@ -1,4 +1,4 @@
-//! Equations whose solutions are known, for finding those of a mechanism \[T75\].
+//! Start system of the homotopy, in Study's coordinates \[T75\].
 //!
 //! In Study's coordinates of a pose, `x = (q, p)` with the dual part `p = o q/2Λ`, each equation of
 //! [`forward`](crate::forward_kinematics::newton) is homogeneous: of degree two, or four for a rod whose legs are at an angle. Products of as
@@ -244,7 +244,7 @@ mod tests {
                 let (after, before) = (moved(h), moved(-h));
                 for i in 0..6 {
                     let size = matrix[i].iter().map(|c| c.norm()).fold(0.0, f64::max);
-                    // No turn changes the residual of an idle spin's equation alone.
+                    // No rotation changes the residual of an idle spin's equation alone.
                     assert!(close(matrix[i][j], after[i], before[i], 10.0 * size), "{}: {i} {j}", mech.name);
                 }
             }
@@ -260,7 +260,7 @@ mod tests {
         let [q, p, turned]: [[C; 4]; 3] = std::array::from_fn(|_| std::array::from_fn(|_| draw.complex()));
         let along = |p: [C; 4], q: [C; 4], share: C| std::array::from_fn::<C, 4, _>(|i| p[i] - q[i] * share);
         let p = along(p, q, dot(&p, &q) / dot(&q, &q));
-        // Square to its own q, and as much along the first one as the other product is.
+        // Perpendicular to its own q, and as much along the first one as the other product is.
         let across = along(turned, q, dot(&turned, &q) / dot(&q, &q));
         let other: [C; 4] = std::array::from_fn(|_| draw.complex());
         let mut second = along(other, across, dot(&other, &across) / dot(&across, &across));

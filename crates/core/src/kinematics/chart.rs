@@ -1,8 +1,9 @@
-//! Local coordinates of the poses that keep the constraints, and how accelerations read in them \[T53\].
+//! Local coordinates (a chart) of the constraint manifold, by tangent-space parametrisation, and
+//! accelerations in them \[T53\].
 //!
-//! A chart is made at a pose. Its coordinates θ, as many as the mechanism has freedoms, are steps along the twists that
-//! the constraints allow there; across them the pose is put on the constraints by Newton's method. So whatever
-//! integrates θ stays on the constraints, as exactly as numbers can.
+//! A chart is made at a pose. Its coordinates θ, as many as the mechanism has degrees of freedom, are steps
+//! along the twists that the constraints allow there; across them the pose is put on the constraints by
+//! Newton's method. So whatever integrates θ stays on the constraints, as exactly as numbers can.
 
 use nalgebra::DMatrix;
 
@@ -18,7 +19,8 @@ const NEWTON_STEPS: usize = 20;
 /// A step across, relative to the characteristic length, that is rounding.
 const ROUNDING: f64 = 4e-16;
 
-/// The same after an iteration that has converged.
+/// Largest step across, relative to the characteristic length, that still counts as rounding after
+/// convergence.
 const MOST_ROUNDING: f64 = 1e-13;
 
 /// Coordinates about a pose. A vector of the chart is (Δo, Λw), with w the vector of the Cayley map.
@@ -109,7 +111,7 @@ impl Chart {
         solve(m, values)
     }
 
-    /// The twist at the turn w of a rate x' of the chart's vector: ω = (w' + ½ w×w')/(1 + ¼ w·w).
+    /// The twist at the rotation w of a rate x' of the chart's vector: ω = (w' + ½ w×w')/(1 + ¼ w·w).
     fn moved(&self, turn: Vec3<f64>, rate: &[f64; 6]) -> Twist<f64> {
         let Twist { v, omega: w1 } = self.twist_of(rate);
         Twist::new(v, (w1 + turn.cross(w1) * 0.5) * (1.0 / (1.0 + 0.25 * turn.dot(turn))))
@@ -167,7 +169,8 @@ impl Chart {
         self.shares(&Twist::new(twist.v, twist.omega * self.scale).array())
     }
 
-    /// θ'' of an acceleration at a place: with `w' = ω - ½ w×ω + ¼ w (w·ω)`, differentiated once.
+    /// θ'' of an acceleration at a point of the chart: with `w' = ω - ½ w×ω + ¼ w (w·ω)`, differentiated
+    /// once.
     #[must_use]
     pub fn second_rates(&self, place: &Place, acceleration: &Acceleration<f64>) -> Vec<f64> {
         let (w, omega, eps) = (place.turn, place.twist.omega, acceleration.eps);

@@ -38,7 +38,7 @@ pub enum Set<S = f64> {
     Paper(Plane<S>),
     /// (α, p, h, β, γ): no dependent coordinate, no fold \[T20\].
     Natural(Plane<S>),
-    /// Tip position and tool axis direction, the turn about the tool from the constraint \[T21\].
+    /// Tip position and tool axis direction, the rotation about the tool from the constraint \[T21\].
     Tool,
     /// x, y, z and the angles of Rx(rx) Ry(ry) Rz(rz) \[T22\].
     Pose,
@@ -112,7 +112,7 @@ impl<S: Scalar> Set<S> {
                 Pose { rotation, o: middle - rotation.of(plane.platform_point) }
             }
             Set::Tool => {
-                // [T21] R = (home axis → axis) (turn about the home axis) R_home
+                // [T21] R = (home axis → axis) (rotation about the home axis) R_home
                 let [x, y, z, i, j, k, turn] = *q;
                 let home_axis = mech.home.rotation * mech.tool_axis;
                 let direction = Vec3::new(i, j, k).unit();
@@ -143,7 +143,7 @@ impl Set<Dual<f64>> {
 }
 
 impl Set {
-    /// The same for a mechanism that may vary, but does not.
+    /// Set with dual numbers of zero rate, for a mechanism that may vary.
     pub(crate) fn lifted(&self) -> Set<Dual<f64>> {
         let lifted = |plane: &Plane| Plane {
             base: Mat3::lift(plane.base),
@@ -369,7 +369,7 @@ fn turn_xyz<T: Real>([(s1, c1), (s2, c2), (s3, c3)]: [(T, T); 3]) -> Mat3<T> {
     ])
 }
 
-/// Rodrigues' formula for a turn about a constant unit axis.
+/// Rodrigues' formula for a rotation about a constant unit axis.
 #[inline(always)]
 fn turn_about<T: Trig>(axis: Vec3<f64>, angle: T) -> Mat3<T> {
     let (s, c) = angle.sin_cos();
@@ -424,7 +424,7 @@ pub fn state(
     State { coordinates: q, platform: motion(&set.pose(mech, &q)), branch, status }
 }
 
-/// What must hold, each with the status where it does not; the first that fails counts.
+/// Conditions, each with the status where it fails; the first that fails counts.
 pub type Conditions<V> = [(Mask<V>, Status); 2];
 
 fn first(conditions: Conditions<f64>) -> Status {
@@ -523,7 +523,7 @@ impl<V: Real> Variation<V> {
     }
 }
 
-/// What varies with a number of the set, or with one of the mechanism.
+/// Variation of the coordinates' map with a number of the set, or with one of the mechanism.
 pub(crate) struct Varying<'a, V> {
     pub mech: &'a Mechanism<Dual<f64>>,
     pub set: &'a Set<Dual<f64>>,
@@ -601,8 +601,8 @@ impl<V: Lanes> Following<V> {
         Following { dependent, by, inverse: solved.x, pivots }
     }
 
-    /// What varies, with what follows: `G_y δy = -δg`, then the same of rates and second rates with what the former do to
-    /// them.
+    /// Variation completed by the dependent coordinates, G_y δy = -δg, then by their rates and second rates
+    /// in the same way.
     #[must_use]
     #[inline(always)]
     pub(crate) fn with(&self, mut all: Variation<V>) -> Variation<V> {
@@ -622,7 +622,8 @@ impl<V: Lanes> Following<V> {
     }
 }
 
-/// Whether there is a shortest turn from the tool axis at home: not to no direction, and not to the opposite one.
+/// Whether there is a shortest rotation from the tool axis at home: not to no direction, and not to the
+/// opposite one.
 #[inline(always)]
 fn tool_turn<V: Ordered>(mech: &Mechanism, q: &Values<Jet<V>>) -> Conditions<V> {
     let axis = Vec3::new(q[3].x, q[4].x, q[5].x);
@@ -843,7 +844,7 @@ pub fn best_given(mech: &Mechanism, set: &Set) -> Vec<bool> {
     best.1
 }
 
-/// What one unit of a dependent coordinate's step is measured by: a length or a radian.
+/// Unit of a dependent coordinate's step: the characteristic length, or a radian.
 #[inline(always)]
 fn reach(set: &Set, index: usize, scale: f64) -> f64 {
     match set {

@@ -1,4 +1,4 @@
-//! One leg: where it is, how its platform end moves, how it turns, and how its links move.
+//! Kinematics of one leg: position, motion of its platform end, rotation, and motion of its links.
 
 pub use crate::kinematics::leg_state::{End, Frame, PointMotion, Position, State, Turn};
 use crate::kinematics::quadratic_forms::Hessian;
@@ -33,13 +33,14 @@ pub fn ahead<S: Constant<T>, T: Real>(mech: &Mechanism<S>, direction: &Direction
     vectors(&mech.legs[direction.leg], pose).1.dot(d)
 }
 
-/// Where the strut begins, base axes.
+/// Foot of the strut, base axes.
 #[inline(always)]
 pub fn foot<T: Real>(leg: &Leg<impl Constant<T>>, p: &Position<T>) -> Vec3<T> {
     leg.drive.foot(Vec3::lift(leg.base.point), p)
 }
 
-/// δ·d, d being the direction of the prismatic joint: one of a telescopic leg, zero where a strut is square to its rail.
+/// δ·d, d being the direction of the prismatic joint: one of a telescopic leg, zero where a strut is
+/// perpendicular to its rail.
 #[inline(always)]
 pub fn transmission<T: Real>(leg: &Leg<impl Constant<T>>, p: &Position<T>) -> T {
     leg.drive.transmission(p)
@@ -58,7 +59,7 @@ pub fn hessian<T: Real>(leg: &Leg<impl Constant<T>>, p: &Position<T>) -> Hessian
     leg.drive.hessian(p)
 }
 
-/// The unit axis behind a leg's frame in base axes, and whether it turns with the platform.
+/// The unit axis behind a leg's frame in base axes, and whether it rotates with the platform.
 #[inline(always)]
 pub(crate) fn turning_axis<T: Real>(turning: Turning<impl Constant<T>>, pose: &Pose<T>) -> (Vec3<T>, bool) {
     match turning {
@@ -135,7 +136,7 @@ pub fn turn<T: Real>(
             let (a, b) = (a + omega.z, b - omega.x);
             let a1 = a1 + eps.z - omega.y * (omega.x + b + b);
             let (s, s1) = spin(leg.turning, f.slope, a, b, a1);
-            // The platform's turn about δ, and its rate, come on top.
+            // The platform's rotation about δ, and its rate, come on top.
             (omega.y + s, eps.y + omega.x.mul_add(a, omega.z * b) + s1)
         }
         _ => spin(leg.turning, f.slope, a, b, a1),
@@ -225,7 +226,7 @@ pub fn cylinder<T: Real>(leg: &Leg<impl Constant<T>>, state: &State<T>) -> Point
     leg.drive.first_link(leg.cylinder.center, state)
 }
 
-/// How a rod turns about its own line, from the leg that leads it \[T7\].
+/// Rotation of a rod about its own line, from the leg that leads it \[T7\].
 #[derive(Clone, Copy, Debug)]
 pub struct RodTurn<T> {
     pub rate: T,

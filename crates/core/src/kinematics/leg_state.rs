@@ -1,4 +1,5 @@
-//! A leg at an instant: its place, its motion, its turning, as what [`leg`](crate::kinematics::leg) and the drives find of them.
+//! A leg at an instant: its place, its motion, its rotation, as what [`leg`](crate::kinematics::leg) and the
+//! drives find of them.
 
 use crate::number::real::Real;
 use crate::spatial::{Mat3, Vec3};
@@ -51,7 +52,7 @@ pub struct End<T> {
     pub delta_acceleration: [T; 2],
 }
 
-/// How the leg turns \[T6\].
+/// Rotation of the leg: spin, angular velocity and acceleration \[T6\].
 #[derive(Clone, Copy, Debug)]
 pub struct Turn<T> {
     pub spin: T,
@@ -83,7 +84,8 @@ impl<T: Real> State<T> {
         self.frame.axes * self.turn.eps
     }
 
-    /// The motion of a point fixed in a link that turns with the leg, from that of the link's reference point.
+    /// The motion of a point fixed in a link that rotates with the leg, from that of the link's reference
+    /// point.
     #[inline(always)]
     pub(crate) fn point_motion(
         &self,
@@ -101,7 +103,8 @@ impl<T: Real> State<T> {
     }
 }
 
-/// A point fixed in a link that turns with the leg: offset from the link's reference point, velocity, acceleration.
+/// A point fixed in a link that rotates with the leg: offset from the link's reference point, velocity,
+/// acceleration.
 #[derive(Clone, Copy, Debug)]
 pub struct PointMotion<T> {
     pub offset: Vec3<T>,

@@ -75,7 +75,7 @@ impl Limit {
         }
     }
 
-    /// The legs that it concerns; those on the rod for the turn of a rod, all for the conditioning.
+    /// The legs that it concerns; those on the rod for the rotation of a rod, all for the conditioning.
     #[must_use]
     pub fn legs(&self, mech: &Mechanism) -> Vec<usize> {
         match &self.measure {
@@ -92,7 +92,7 @@ impl Limit {
         }
     }
 
-    /// What kinematics calls a pose beyond this limit; `Ok` for limits that are none of a joint.
+    /// Status of a pose beyond this limit; `Ok` for limits that are not those of a joint.
     #[must_use]
     pub fn status(&self) -> Status {
         match self.measure {
@@ -129,7 +129,7 @@ impl Limit {
         }
     }
 
-    /// The same of one pose: none for conditioning and force. No allocation.
+    /// Quantity of the limit at one pose: none for conditioning and force. No allocation.
     pub fn geometric<T: Trig>(&self, mech: &Mechanism, pose: &Pose<T>) -> Option<T> {
         let closed = !matches!(self.measure, Measure::Conditioning | Measure::Force { .. });
         closed.then(|| self.of_pose(mech, pose, &mut Seen::default()))
@@ -153,7 +153,7 @@ impl Limit {
         })
     }
 
-    /// The same of one pose; without forces the margin of a force is NaN.
+    /// Margin of the limit at one pose; without forces the margin of a force is NaN.
     #[must_use]
     pub fn margin(&self, mech: &Mechanism, pose: &Pose<f64>, forces: Option<&[f64]>) -> f64 {
         self.margin_at(mech, pose, forces.unwrap_or_default(), &mut Seen::default())
@@ -163,7 +163,7 @@ impl Limit {
 /// As many legs as lengths are remembered of.
 const REMEMBERED: usize = 8;
 
-/// What has been seen of the legs at a pose, for all limits that are looked at there.
+/// Leg lengths and directions at a pose, computed once for all limits evaluated there.
 #[derive(Clone, Copy, Debug)]
 pub struct Seen<T> {
     /// Of the first legs.
@@ -216,7 +216,7 @@ fn smallest<V: Lanes>(mech: &Mechanism, pose: &Pose<V>) -> V {
     V::load(&smallest_of_each(mech, &poses, V::WIDTH))
 }
 
-/// The same of the first `count` lanes.
+/// Smallest singular value in each of the first `count` lanes.
 #[inline(never)]
 fn smallest_of_each(mech: &Mechanism, poses: &Poses, count: usize) -> Row {
     let mut found = [0.0; WIDTH];
@@ -234,7 +234,7 @@ impl Strut {
         Segment(self.foot(mech, pose), b).without(self.cut)
     }
 
-    /// Where the strut begins, base axes.
+    /// Foot of the strut, base axes.
     #[inline(always)]
     fn foot<T: Real>(&self, mech: &Mechanism, pose: &Pose<T>) -> Vec3<T> {
         let leg = &mech.legs[self.leg];
@@ -262,7 +262,7 @@ fn cone<T: Trig>(mech: &Mechanism, leg: usize, side: Axes, pose: &Pose<T>, seen:
     }
 }
 
-/// Turn of an R joint; of one on a rod, about n.
+/// Rotation of an R joint; of one on a rod, about n.
 #[inline(always)]
 fn angle<T: Trig>(
     mech: &Mechanism,
@@ -300,7 +300,7 @@ pub fn margins(mech: &Mechanism, pose: &Pose<f64>, forces: Option<&[f64]>, out: 
     }
 }
 
-/// Which limit has the least margin relative to its scale, and that margin \[T35\].
+/// The limit with the least relative margin, and that margin \[T35\].
 #[derive(Clone, Copy, Debug)]
 pub struct Binding<V> {
     /// Its number, the first of several; NaN where a margin is NaN, or without limits.

@@ -1,5 +1,5 @@
-//! Mobility from ranks: which constraints are independent, how many loop closures are redundant and which legs they
-//! couple, which freedoms are passive \[T18\].
+//! Mobility from ranks: which constraints are independent, how many loop closures are redundant and which
+//! legs they couple, which degrees of freedom are passive \[T18\].
 //!
 //! Ranks are taken at several generic poses near home, which the machine can have, and the largest counts: at a singular pose
 //! a rank only drops.
@@ -30,7 +30,8 @@ const SPREADS: [f64; 4] = [0.03, 0.01, 0.003, 0.001];
 
 const NEWTON_STEPS: usize = 60;
 
-/// Independent constraints, idle freedoms and the mobility of a mechanism whose parts are in place.
+/// Independent constraints, local degrees of freedom and the mobility of a mechanism whose parts are in
+/// place.
 #[must_use]
 pub fn analyse(mech: &Mechanism) -> (Vec<Constraint>, Vec<Idle>, Mobility) {
     let poses = generic_poses(mech);
@@ -185,7 +186,7 @@ fn rank_of(m: &DMatrix<f64>) -> usize {
     Svd::of(m).map_or(0, |svd| svd.rank(RANK_TOLERANCE))
 }
 
-/// Freedoms, idle ones apart, that are left when the actuated legs keep their lengths, at a pose.
+/// Degrees of freedom, local ones apart, that are left when the actuated legs keep their lengths, at a pose.
 fn uncontrolled(mech: &Mechanism, independent: &[Constraint], idle: &[Idle], pose: &Pose<f64>) -> usize {
     let size = mech.characteristic_length;
     let legs = mech.actuated().map(|(_, leg)| leg::row(leg, &leg::position(leg, pose)));
@@ -204,8 +205,8 @@ struct Closure {
     passive_legs: Vec<usize>,
 }
 
-/// Loop closures at a pose: for each leg, the twists of its joints add up to the platform's. Unknown are all joint
-/// rates and the platform's twist; a rod's turning is one unknown for all legs that it carries.
+/// Loop closures at a pose: for each leg, the twists of its joints add up to the platform's. Unknown are all
+/// joint rates and the platform's twist; a rod's rotation is one unknown for all legs that it carries.
 fn closure(mech: &Mechanism, pose: &Pose<f64>) -> Closure {
     let size = mech.characteristic_length;
     let legs: Vec<Vec<Screw>> = mech.legs.iter().map(|leg| leg_screws(leg, pose)).collect();
@@ -255,7 +256,7 @@ struct Screw {
 }
 
 impl Screw {
-    /// A turn about a line through o + point.
+    /// A rotation about a line through o + point.
     fn turn(axis: Vec3<f64>, point: Vec3<f64>) -> Self {
         Screw { linear: point.cross(axis), angular: axis }
     }
@@ -270,7 +271,7 @@ fn leg_screws(leg: &Leg, pose: &Pose<f64>) -> Vec<Screw> {
     let (base, platform) = (leg.base.axis.unwrap_or(n), leg.platform.axis.map_or(n, |a| pose.rotation * a));
     let mut base_turns = leg.base.kind.turns(base, n);
     if leg.rod.is_some() {
-        // The rod's own turning is shared with its other legs; what is left is R about n.
+        // The rod's own rotation is shared with its other legs; what is left is R about n.
         base_turns.remove(0);
     }
     let mut screws: Vec<Screw> = base_turns.into_iter().map(|a| Screw::turn(a, below)).collect();

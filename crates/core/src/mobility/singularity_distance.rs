@@ -1,4 +1,5 @@
-//! How far each coordinate can go, the others kept and the dependent ones following, until det J is zero \[T34\].
+//! Distance from singularity along each coordinate: until det J = 0, the others kept and the dependent ones
+//! following \[T34\].
 
 use std::cell::Cell;
 use std::f64::consts::PI;
@@ -22,13 +23,13 @@ pub struct Nearest {
     pub searched: f64,
 }
 
-/// What is searched: a set of coordinates, those that are given, and how far the lengths among them may go, m.
+/// Search for singularities along coordinates: the set, the given coordinates, and the reach of lengths, m.
 #[derive(Clone, Debug)]
 pub struct Search {
     pub set: Set,
     pub given: Vec<bool>,
     pub reach: f64,
-    /// The length that turns are counted with, m.
+    /// The length that rotations are counted with, m.
     pub scale: f64,
 }
 
@@ -129,7 +130,7 @@ impl Path<'_> {
         det.x.is_finite().then_some(Node { t: way, f: det.x, d: det.d })
     }
 
-    /// What is singular about a pose, if anything is.
+    /// Kind of singularity of a pose, if it is singular.
     fn kind(&self, pose: &Pose<f64>, tolerance: f64) -> Option<Kind> {
         let found = singularity::singularity(self.mech, pose, self.search.scale, tolerance);
         Some(found.kind).filter(|&kind| kind != Kind::None)

@@ -91,7 +91,7 @@ impl Lanes for f64 {
     }
 }
 
-/// What is to be done with registers of any width.
+/// Work to be compiled for registers of any width.
 ///
 /// The functions for one instruction set are methods of the task, because the compiler puts a method into the codegen unit of
 /// the type that has it: so the tasks of different modules, which are most of what there is to compile, compile side by side.

@@ -1,6 +1,6 @@
-//! A number of many parts for maps that are long: how a pose with its rates varies. What it takes to multiply two is a
-//! function of its own, called rather than copied into the map, which would be some hundred thousand instructions for each
-//! kind of register.
+//! A dual-number type whose arithmetic is outlined (`#[inline(never)]`), to bound code size: for the
+//! variation of a pose with its rates. Inlined into the maps of the coordinate sets it would be some hundred
+//! thousand instructions for each kind of register.
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 

@@ -1,4 +1,4 @@
-//! Random numbers that are the same every time: any fixed generic direction will do.
+//! Reproducible pseudo-random numbers, for generic points and directions.
 
 use crate::number::complex::Complex;
 use crate::spatial::Vec3;

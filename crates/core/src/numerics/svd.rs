@@ -51,7 +51,7 @@ impl Svd {
     }
 }
 
-/// Makes every pair of columns of u square once, v following; whether any had to turn.
+/// Makes every pair of columns of u square once, v following; whether any had to rotate.
 fn sweep(u: &mut DMatrix<f64>, v: &mut DMatrix<f64>, nothing: f64) -> bool {
     let mut turned = false;
     for j in 1..u.ncols() {
@@ -61,8 +61,8 @@ fn sweep(u: &mut DMatrix<f64>, v: &mut DMatrix<f64>, nothing: f64) -> bool {
             if a.min(b) <= nothing || product.abs() <= SQUARE * (a * b).sqrt() {
                 continue;
             }
-            // The lesser turn that makes them square: t = tan of its angle, t² + 2 ζ t = 1. What was passed over above
-            // keeps ζ below 1e31, so that its square is finite.
+            // The smaller rotation that makes them orthogonal: t = tan of its angle, t² + 2 ζ t = 1. What was
+            // passed over above keeps ζ below 1e31, so that its square is finite.
             let zeta = (b - a) / (2.0 * product);
             let t = zeta.signum() / (zeta.abs() + (zeta * zeta + 1.0).sqrt());
             let cos = 1.0 / (t * t + 1.0).sqrt();

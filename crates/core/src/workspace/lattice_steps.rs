@@ -21,7 +21,8 @@ const PIECES: u32 = 64;
 /// Share of a predicted step within which a known pose is the one that the step leads to.
 const PREDICTED: f64 = 0.25;
 
-/// Where the marker is in platform axes, in characteristic lengths: off every symmetry that a platform may have.
+/// Position of the marker in platform axes, in characteristic lengths: off every symmetry that a platform may
+/// have.
 const MARKER: Vec3<f64> = Vec3 { x: 0.53, y: 0.31, z: 0.79 };
 
 /// A bit for every lane.
@@ -30,12 +31,12 @@ const ALL: u32 = (1 << WIDTH) - 1;
 /// Actuated legs at most.
 pub(super) const AXES: usize = 6;
 
-/// Where a pose has the point by which it is known.
+/// Position of the marker point that identifies a pose.
 pub(super) fn marker(mech: &Mechanism, pose: &Pose<f64>) -> Vec3<f64> {
     pose.o + pose.rotation * (MARKER * mech.characteristic_length)
 }
 
-/// Where poses may be.
+/// Region of admissible poses.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Room<'a> {
     pub mech: &'a Mechanism,
@@ -94,7 +95,7 @@ fn is_of_joint(limit: &Limit) -> bool {
 pub(super) struct Predicted {
     /// Of the marker, for both directions of each axis.
     markers: [[[Row; 3]; 2]; AXES],
-    /// How far from there the marker of the pose that a step leads to may be, m.
+    /// Tolerance for the marker of the pose that a step leads to, m.
     within: [[Row; 2]; AXES],
 }
 
@@ -180,11 +181,11 @@ pub(super) struct Way {
     /// The last pose on it that is inside, and its share of the way in shortest pieces.
     pose: Pose<f64>,
     share: u32,
-    /// What is tried next, in shortest pieces.
+    /// Length of the next piece to try, in shortest pieces.
     piece: u32,
 }
 
-/// What is met on a way.
+/// Event on a path.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Met {
     /// A pose at the end of a piece, with its o.

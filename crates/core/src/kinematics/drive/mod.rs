@@ -99,7 +99,8 @@ impl<S> Drive<S> {
         ask!(self, first_link(center, state))
     }
 
-    /// The first link's axes, and how it turns along them; of a carriage, which has no inertia, those of the leg.
+    /// The first link's axes, and how it rotates along them; of a carriage, which has no inertia, those of
+    /// the leg.
     #[inline(always)]
     pub fn first_turn<T: Real>(&self, state: &State<T>) -> (Mat3<T>, Turn<T>)
     where
@@ -108,8 +109,8 @@ impl<S> Drive<S> {
         ask!(self, first_turn(state))
     }
 
-    /// What weight and inertia of the first link do along the coordinate where it does not turn with the leg \[T69\]; zero
-    /// where it does.
+    /// Generalised force of the first link's weight and inertia along the coordinate, if the link does not
+    /// rotate with the leg \[T69\]; zero if it does.
     #[inline(always)]
     pub fn own_force<T: Real>(&self, body: &Body, gravity: Vec3<T>, state: &State<T>) -> T
     where
@@ -127,7 +128,8 @@ impl<S> Drive<S> {
         ask!(self, active(reaction, p))
     }
 
-    /// What its joint alone does to the leg: a twist at o, of any size that is not far from the strut's length and a turn of one.
+    /// Twist of the leg at o by its prismatic joint alone, of a size comparable with the strut's length and a
+    /// unit rotation.
     #[inline(always)]
     pub fn twist<T: Real>(&self, p: &Position<T>) -> Twist<T>
     where

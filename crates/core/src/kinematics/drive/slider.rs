@@ -40,7 +40,7 @@ impl<S> Slider<S> {
         base + self.a::<T>() * p.coordinate
     }
 
-    /// δ·a, zero where the strut is square to its rail.
+    /// δ·a, zero where the strut is perpendicular to its rail.
     #[inline(always)]
     pub(super) fn transmission<T: Real>(&self, p: &Position<T>) -> T
     where
@@ -98,12 +98,12 @@ impl<S> Slider<S> {
     where
         S: Constant<T>,
     {
-        // δ' = (v_b - (δ·v_b) a/(δ·a))/c: what turns the strut along the rail is felt along δ.
+        // δ' = (v_b - (δ·v_b) a/(δ·a))/c: what rotates the strut along the rail is felt along δ.
         let d = f.axes.transpose_mul(self.a());
         force.y - ((n - force.x) * d.x + (m - force.z) * d.z) / d.y
     }
 
-    /// The carriage does not turn.
+    /// The carriage does not rotate.
     #[inline(always)]
     pub(super) fn first_link<T: Real>(&self, center: Vec3<f64>, state: &State<T>) -> PointMotion<T>
     where
@@ -113,7 +113,7 @@ impl<S> Slider<S> {
         PointMotion { offset: Vec3::lift(center), velocity: a * rate, acceleration: a * acceleration }
     }
 
-    /// Any will do: a carriage has no inertia here, as it does not turn.
+    /// Any will do: a carriage has no inertia here, as it does not rotate.
     #[allow(clippy::unused_self)] // as of all drives
     #[inline(always)]
     pub(super) fn first_turn<T: Real>(&self, state: &State<T>) -> (Mat3<T>, Turn<T>) {
