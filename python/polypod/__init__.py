@@ -7,6 +7,7 @@ files and from 0 in arrays.
 The rooms of the package, from the ground up; each imports only those above it in this list:
 
 - `errors`, `arrays`, `vectors`, `compute`: exceptions, arguments as arrays, vectors of space, threads.
+- `legs`: kinds of joints and of drives: words, units, geometry.
 - `files`: texts, TOML, CSV, units, and the tables of a mechanism file.
 - `answers`: what a mechanism answers, named arrays with units, as datasets and as cards.
 - `mechanism`: `Mechanism`, which is asked, and `load`.

@@ -32,7 +32,7 @@ from polypod.answers.kinematics import (
     PlatformTwist,
     State,
 )
-from polypod.answers.leg_words import word
+from polypod.answers.leg_words import readable_coordinate, word
 from polypod.answers.limits import Conditioning, Limits
 from polypod.answers.mobility import GraphJoint, GraphLink, IdleFreedom, Mobility, Published
 from polypod.answers.notebook import card, picture_of, rows_of
@@ -60,6 +60,8 @@ from polypod.errors import (
 )
 from polypod.files.text import read_text
 from polypod.files.units import readable
+from polypod.legs.drive import Drive
+from polypod.legs.drives import drive_of
 
 _AT_REST = np.empty(0)
 """Twists or accelerations of states that are all at rest."""
@@ -155,12 +157,20 @@ class Mechanism:
     def _repr_html_(self) -> str:
         """Drawing, degrees of freedom, legs and warnings."""
         file, home = self.to_dict(), self.inverse_kinematics(self.home).lengths
-        legs = zip(self.leg_names, self.leg_letters, self.actuated, home, self.stroke, strict=True)
+        legs = zip(
+            self.leg_names, self.leg_letters, self.actuated, self.drives, home, self.stroke, strict=True
+        )
         rows = [
-            (name, letters, "yes" if actuated else "no", readable(length, "m"), _stroke(*stroke))
-            for name, letters, actuated, length, stroke in legs
+            (
+                name,
+                letters,
+                "yes" if actuated else "no",
+                readable_coordinate(drive, length),
+                _stroke(drive, *stroke),
+            )
+            for name, letters, actuated, drive, length, stroke in legs
         ]
-        headers = ("leg", "joints", "actuated", f"{word(self.leg_letters)} at home", "stroke")
+        headers = ("leg", "joints", "actuated", f"{word(self.drives)} at home", "stroke")
         sets = [(name, ", ".join(names)) for name, names in self.coordinate_sets.items()]
         said = f"{'+'.join(self.leg_letters)}, {self.dof} degrees of freedom"
         notes = [
@@ -214,14 +224,18 @@ class Mechanism:
 
         Of a slider the ends of its carriage's way on the rail; without a stroke -inf and inf.
         """
-        free = np.where(self.sliders, -np.inf, 0.0)
-        legs = self._spec["legs"]
-        return np.array([leg["stroke"] or [least, np.inf] for leg, least in zip(legs, free, strict=True)])
+        legs = zip(self._spec["legs"], self.drives, strict=True)
+        return np.array([leg["stroke"] or [drive.least, np.inf] for leg, drive in legs])
+
+    @cached_property
+    def drives(self) -> tuple[Drive, ...]:
+        """What drives each leg: a telescope, or a slider, whose length is the place q of its carriage."""
+        return tuple(drive_of(leg) for leg in self._spec["legs"])
 
     @property
-    def sliders(self) -> NDArray[np.bool_]:
-        """(n,): which legs slide on a rail: their lengths are places q of carriages, forces along it."""
-        return np.array([leg["slider"] is not None for leg in self._spec["legs"]], dtype=bool)
+    def moves_feet(self) -> NDArray[np.bool_]:
+        """(n,): which legs have a drive that moves the base joint; their struts keep their lengths."""
+        return np.array([drive.moves_foot for drive in self.drives], dtype=bool)
 
     @property
     def home(self) -> Array:
@@ -1135,8 +1149,8 @@ def _from_parts(data: dict[str, Any], text: str | None) -> Mechanism:
     return Mechanism(data, text=text)
 
 
-def _stroke(least: float, greatest: float) -> str:
-    low, high = (readable(end, "m") for end in (least, greatest))
+def _stroke(drive: Drive, least: float, greatest: float) -> str:
+    low, high = (readable_coordinate(drive, end) for end in (least, greatest))
     if np.isfinite(least) and least != 0.0:
         return f"{low} to {high}" if np.isfinite(greatest) else f"from {low}"
     return f"to {high}" if np.isfinite(greatest) else "free"
@@ -1145,7 +1159,7 @@ def _stroke(least: float, greatest: float) -> str:
 def spans(mech: Mechanism) -> Array:
     """(n,): from base joint to platform joint at the centre pose, m: the lengths of legs and struts."""
     home = mech.inverse_kinematics(mech.home)
-    return np.where(mech.sliders, np.linalg.norm(home.vectors, axis=-1), home.lengths)
+    return np.where(mech.moves_feet, np.linalg.norm(home.vectors, axis=-1), home.lengths)
 
 
 def list_mechanisms() -> tuple[str, ...]:

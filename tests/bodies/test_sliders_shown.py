@@ -8,6 +8,7 @@ import pytest
 import polypod as pp
 from polypod.answers import leg_words
 from polypod.bodies.links import link_frames, links_of
+from polypod.legs.drives import drive_of_letters
 from polypod.plots import fig4_panels
 from polypod.plots.scene import Scene
 from polypod.plots.topology import _topology_places
@@ -56,7 +57,7 @@ def test_frames_are_at_the_foot(name):
     mech, poses = sliders.mechanism(name), states(name)[0]
     names, found = [link.name for link in links_of(mech)], link_frames(mech, poses)
     legs = mech.inverse_kinematics(poses)
-    for i in np.flatnonzero(mech.sliders):
+    for i in np.flatnonzero(mech.moves_feet):
         leg = mech.geometry["legs"][i]
         carriage, strut = (
             found.frames[:, names.index(f"{part} {leg['name']}")] for part in ("carriage", "strut")
@@ -111,9 +112,9 @@ def test_the_topology_has_a_column_for_each_leg(mech):
 
 
 def test_words():
-    assert leg_words.word(["UPS", "SPS"]) == "length"
-    assert leg_words.word(["PUS"]) == "place"
-    assert leg_words.words(["PUS", "UPU"]) == "lengths and places"
+    assert leg_words.word(map(drive_of_letters, ["UPS", "SPS"])) == "length"
+    assert leg_words.word(map(drive_of_letters, ["PUS"])) == "place"
+    assert leg_words.words(map(drive_of_letters, ["PUS", "UPU"])) == "lengths and places"
 
 
 def test_tables_say_place():
@@ -127,8 +128,8 @@ def test_tables_say_place():
     assert [row[0] for row in bodies.rows[1:3]] == ["carriage 1", "strut 1"]
     rails = next(table for table in data_tables(mech) if table.title.startswith("Rails"))
     assert [row[2:] for row in rails.rows] == [("500.00", "+1")] * 3
-    assert "rail" in actuators_table([], mech.leg_letters).note
-    assert "rail" not in actuators_table([], ("UPS",)).note
+    assert "rail" in actuators_table([], mech).note
+    assert "rail" not in actuators_table([], pp.load("3-rps")).note
 
 
 def test_a_stroke_that_begins_at_the_point_of_the_rail_is_a_limit():

@@ -145,7 +145,7 @@ class Answer:
             of = about.dims if quantity.name in self._same_for_all else (*leading, *about.dims)
             # A variable may not have the name of a dimension.
             name = quantity.key if quantity.name in DIMENSIONS else quantity.name
-            data[name] = (of, values, attributes_of(quantity.key, about, self.mech.sliders))
+            data[name] = (of, values, attributes_of(quantity.key, about, self.mech.drives))
             dims |= {*of}
         coords = coords_of(self.mech, dims, self.labels())
         title, _ = self._heading()

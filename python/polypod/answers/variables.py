@@ -9,14 +9,13 @@ from collections.abc import Callable, Mapping, Sequence
 from enum import IntEnum
 from typing import Any, NamedTuple, Protocol
 
-import numpy as np
-from numpy.typing import NDArray
-
 from polypod.answers.mobility import Mobility
 from polypod.answers.parts import Joint, Limit
 from polypod.answers.singularity_kind import SingularityKind
 from polypod.answers.status import Status
 from polypod.files.units import coordinate_unit
+from polypod.legs.drive import Drive
+from polypod.legs.drives import kinds_among
 
 Dims = tuple[str, ...]
 
@@ -40,8 +39,8 @@ class HasParts(Protocol):
     rod_names: tuple[str, ...]
 
     @property
-    def sliders(self) -> NDArray[np.bool_]:
-        """(n,): which legs slide on a rail."""
+    def drives(self) -> tuple[Drive, ...]:
+        """What drives each leg."""
 
     @property
     def coupled_legs(self) -> tuple[str, str] | None:
@@ -272,28 +271,16 @@ def variable(name: str) -> Variable:
     return Variable(_ONE, coordinate_unit(base) + per, symbol, f"{before}coordinate {base}")
 
 
-_OF_SLIDERS = {
-    "length": ("q", "place of the carriage"),
-    "rate": ("q'", "rate of the carriage's place"),
-    "leg_acceleration": ("q''", "second rate of the carriage's place"),
-    "piston_velocity": ("v_p", "velocity of the strut's mass centre"),
-    "piston_acceleration": ("a_p", "acceleration of the strut's mass centre"),
-    "cylinder_velocity": ("v_q", "velocity of the carriage's mass centre"),
-    "cylinder_acceleration": ("a_q", "acceleration of the carriage's mass centre"),
-    "force": ("f_a", "active force along the rail"),
-}
-"""Symbol and long name of what is called otherwise where a leg slides on a rail."""
-
-
-def attributes_of(name: str, about: Variable, sliders: NDArray[np.bool_]) -> dict[str, Any]:
-    """Those of a variable of a dataset of a mechanism, with `sliders` (n,) among its legs."""
-    found, sliding = about.attributes, _OF_SLIDERS.get(name)
-    if sliding is None or not sliders.any():
+def attributes_of(name: str, about: Variable, drives: Sequence[Drive]) -> dict[str, Any]:
+    """Those of a variable of a dataset of a mechanism with these drives; some have other names for it."""
+    found, kinds = about.attributes, kinds_among(drives)
+    own = [drive.variables[name] for drive in kinds if name in drive.variables]
+    if not own:
         return found
-    symbol, long_name = sliding
-    if not sliders.all():
-        long_name = f"{about.long_name}, or {long_name}"
-    return found | {"symbol": symbol, "long_name": long_name}
+    names = [long_name for _, long_name in own]
+    if len(own) < len(kinds):
+        names = [about.long_name, *names]
+    return found | {"symbol": own[0][0], "long_name": ", or ".join(names)}
 
 
 # --- labels along dimensions --------------------------------------------------------------------------------

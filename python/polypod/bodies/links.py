@@ -7,7 +7,7 @@ tools all place these.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import trimesh
@@ -16,32 +16,19 @@ from trimesh import Trimesh
 
 from polypod.answers.answer import Codes
 from polypod.answers.kinematics import InverseKinematics
+from polypod.bodies.drawing import DrawnLeg
+from polypod.bodies.drives import DRAWINGS
 from polypod.bodies.palette import PALE, color_of
-from polypod.bodies.rails import Rail, behind, flat_normal, lower_ends, way
-from polypod.bodies.solids import ball, block, lathe, plate, tube
+from polypod.bodies.pieces import BASE, JOINT, PLATFORM, ROD, Piece, on_body, sunk
+from polypod.bodies.rail import Rail, behind, flat_normal, lower_ends
+from polypod.bodies.solids import plate, tube
 from polypod.mechanism import Mechanism
 from polypod.vectors import perpendiculars, unit
 
 Array = NDArray[np.float64]
-LinkKind = Literal["base", "rod", "cylinder", "piston", "carriage", "strut", "platform"]
-
-STEEL, JOINT, BASE, PLATFORM, ROD = "#E8ECF0", "#4A4F57", "#C9CDD3", "#9CC3DF", "#8A6D3B"
 
 RADIUS = 0.085
 """Of a strut where the file gives none, by the characteristic length."""
-
-NOMINAL_STROKE = (0.75, 1.35)
-"""Shortest and longest length drawn for a leg whose file gives no stroke, by its length at home."""
-
-
-@dataclass(frozen=True, eq=False)
-class Piece:
-    """A part of a link, a closed surface of one colour, in the link's axes, m."""
-
-    name: str
-    color: str
-    """Such as #C9CDD3."""
-    mesh: Trimesh
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +42,8 @@ class Link:
 
     name: str
     """Such as "base", "rod L", "cylinder 1", "piston 1", "carriage 2", "strut 2", "platform"."""
-    kind: LinkKind
+    kind: str
+    """The name's first word."""
     index: int
     """Of the rod or leg, from 0; 0 for base and platform."""
     pieces: tuple[Piece, ...]
@@ -107,7 +95,7 @@ class LinkPlaces:
         legs = geometry["legs"]
         self._starts = np.array([leg["base"]["point"] for leg in legs])
         self._ends = np.array([leg["platform"]["point"] for leg in legs])
-        self._sliders = np.array([leg["slider"] is not None for leg in legs])
+        self._legs, self._moved = legs, mech.moves_feet
         # Which of the base joint's axes is n.
         self._normals = [int(leg["base"]["joint"] == "U") for leg in legs]
         self._rod_points = np.array([rod["point"] for rod in geometry["rods"]]).reshape(-1, 3)
@@ -122,7 +110,7 @@ class LinkPlaces:
         rods, n = len(self._rod_points), self._mech.n_legs
         axes, known = _filled(self._leg_axes(joints.axes[..., rods:, :, :], legs), legs.directions, column=1)
         b = (pose[..., None, :3, :3] @ self._ends[..., None])[..., 0] + pose[..., None, :3, 3]
-        starts = np.where(self._sliders[:, None], b - legs.vectors, self._starts)
+        starts = np.where(self._moved[:, None], b - legs.vectors, self._starts)
         lines = np.broadcast_to(self._rod_lines, (*pose.shape[:-2], rods, 3))
         rod_axes, rod_known = _filled(joints.axes[..., :rods, :, :], lines, column=0)
 
@@ -132,16 +120,18 @@ class LinkPlaces:
         frames[..., 0, :3, :3] = np.eye(3)
         frames[..., 1 : 1 + rods, :3, :3], turn_known[..., 1 : 1 + rods] = rod_axes, rod_known
         frames[..., 1 : 1 + rods, :3, 3] = self._rod_points
-        turns = self._sliders[:, None, None]
-        # A carriage does not rotate; a strut begins where a cylinder does.
+        # What carries a base joint, such as a carriage, has axes of its own; a strut begins at that joint.
+        lower = axes.copy()
+        for i in np.flatnonzero(self._moved):
+            lower[..., i, :, :] = self._mech.drives[i].first_axes(self._legs[i], starts[..., i, :])
         for first, turned, origin in (
-            (1 + rods, np.where(turns, np.eye(3), axes), starts),
-            (2 + rods, axes, np.where(self._sliders[:, None], starts, starts + legs.vectors)),
+            (1 + rods, lower, starts),
+            (2 + rods, axes, np.where(self._moved[:, None], starts, starts + legs.vectors)),
         ):
             span = slice(first, 1 + rods + 2 * n, 2)
             frames[..., span, :3, :3], frames[..., span, :3, 3] = turned, origin
             turn_known[..., span] = known
-        turn_known[..., 1 + rods : 1 + rods + 2 * n : 2] |= self._sliders
+        turn_known[..., 1 + rods : 1 + rods + 2 * n : 2] |= self._moved
         frames[..., -1, :, :] = pose
         lost = np.isnan(frames).any(axis=(-2, -1))
         frames[lost] = np.nan
@@ -149,9 +139,9 @@ class LinkPlaces:
 
     def _leg_axes(self, joints: Array, legs: InverseKinematics) -> Array:
         """(..., n, 3, 3): (n, δ, n×δ) of all legs, from the axes of their joints (..., 3 n, 3, 3)."""
-        # The prismatic joint of a telescopic leg has the axes of its leg.
+        # A drive's joint between the links has the axes of its leg.
         axes = joints[..., 1::3, :, :].copy()
-        for i in np.flatnonzero(self._sliders):
+        for i in np.flatnonzero(self._moved):
             normal, delta = joints[..., 3 * i, :, self._normals[i]], legs.directions[..., i, :]
             axes[..., i, :, :] = np.stack([normal, delta, np.cross(normal, delta)], axis=-1)
         return axes
@@ -195,10 +185,13 @@ class _Shapes:
         home = mech.inverse_kinematics(mech.home)
         self._home_lengths = home.lengths
         ends = self._platform @ mech.home[:3, :3].T + mech.home[:3, 3]
-        sliding = [i for i, leg in enumerate(legs) if leg["slider"] is not None]
-        ways = {i: way(legs[i], float(home.lengths[i])) for i in sliding}
+        ways = {
+            i: way
+            for i, (leg, drive) in enumerate(zip(legs, mech.drives, strict=True))
+            if (way := DRAWINGS[drive].way(leg, float(home.lengths[i]))) is not None
+        }
         middle = self._base.copy()
-        for i in sliding:
+        for i in np.flatnonzero(mech.moves_feet):
             middle[i] = ends[i] - home.vectors[i]
         # Of a planar mechanism, whose joints lie in one plane, the base is below and the platform above.
         above = 1e-6 * mech.characteristic_length * np.array([0.0, 0.0, 1.0])
@@ -279,13 +272,12 @@ class _Shapes:
             # Its foot is a little inside the plate: two bodies with a face in common are no closed surface.
             foot = point - (float(point @ normal) - height + 0.1 * thick) * normal
             joint = self._spec["legs"][i][side]
-            head = point - 1.1 * radius * normal if joint["joint"] == "S" else point  # at the ball or the pin
+            carried = side == "base" and self._mech.moves_feet[i]
+            head = point if carried else point - sunk(joint, radius) * normal
             post = tube(foot, head, 1.1 * thick, end_radius=0.75 * thick)
             pieces.append(Piece(f"post {name}", color, post))
-            if joint["joint"] == "U":
-                pieces.append(Piece(f"pin {name}", JOINT, _pin(point, joint["axis"], radius)))
-            elif joint["joint"] == "F":
-                pieces.append(Piece(f"block {name}", JOINT, block(point, normal, 2.4 * radius)))
+            if not carried:
+                pieces += on_body(joint, radius, name, point, normal)
         return pieces
 
     def _rod(self, index: int) -> list[Piece]:
@@ -302,111 +294,24 @@ class _Shapes:
             Piece("bearing 2", JOINT, tube((high - 0.9 * thick) * x, (high + 0.1 * thick) * x, thick)),
         ]
 
-    def _leg(self, index: int, name: str) -> tuple[Link, Link]:
+    def _leg(self, index: int, name: str) -> list[Link]:
         """The two links of a leg; a passive one is pale."""
-        return (self._slider if index in self._rails else self._telescope)(index, name)
-
-    def _slider(self, index: int, name: str) -> tuple[Link, Link]:
-        """The carriage in base axes, and the strut along the second axis, both from the base joint."""
-        leg, radius, rail = self._spec["legs"][index], self._radii[index], self._rails[index]
-        color = color_of(index) if leg["actuated"] else PALE
-        length = float(leg["slider"]["strut"])
-        carriage = [Piece("shoe", color, rail.shoe()), Piece("bracket", JOINT, rail.bracket())]
-        if leg["base"]["joint"] == "U":
-            carriage.append(Piece("axis", JOINT, _pin((0.0, 0.0, 0.0), leg["base"]["axis"], radius)))
-        y = np.array([0.0, length, 0.0])
-        end = min(2.6 * radius, 0.15 * length)
-        sleeve = [(0.0, end), (0.8 * radius, end), (0.8 * radius, length - end), (0.0, length - end)]
-        strut = [
-            Piece("neck 1", STEEL, tube(0.0 * y, 1.02 * end / length * y, 0.55 * radius)),
-            Piece("sleeve", color, lathe(sleeve)),
-            Piece("neck 2", STEEL, tube((1.0 - 1.02 * end / length) * y, y, 0.55 * radius)),
-            *_on_leg(leg["base"], radius),
-            *_on_leg(leg["platform"], radius, y),
-        ]
-        return (
-            Link(f"carriage {name}", "carriage", index, tuple(carriage)),
-            Link(f"strut {name}", "strut", index, tuple(strut)),
+        leg, drive = self._spec["legs"][index], self._mech.drives[index]
+        drawn = DrawnLeg(
+            leg,
+            self._radii[index],
+            color_of(index) if leg["actuated"] else PALE,
+            self._mech.stroke[index],
+            float(self._home_lengths[index]),
+            self._rails.get(index),
         )
-
-    def _telescope(self, index: int, name: str) -> tuple[Link, Link]:
-        """Cylinder and piston along the second axis."""
-        leg, radius = self._spec["legs"][index], self._radii[index]
-        size = _leg_sizes(self._mech.stroke[index], float(self._home_lengths[index]), radius)
-        bore, seat, wall = 0.6 * radius, 0.8 * radius, 0.3 * radius
-        rim, mouth = size.body - size.collar, size.body
-        barrel = [
-            *((0.0, size.neck), (radius, size.neck), (radius, rim), (seat, rim)),
-            *((seat, mouth), (bore, mouth), (bore, size.neck + wall), (0.0, size.neck + wall)),
-        ]
-        # A little off the barrel's faces: two bodies with a face in common are no closed surface.
-        inner, low, high = 0.97 * seat, rim - 0.02 * radius, mouth + 0.02 * radius
-        collar = [(inner, low), (1.18 * radius, low), (1.18 * radius, high), (inner, high)]
-        neck = [(0.0, 0.0), (0.5 * radius, 0.0), (0.5 * radius, size.neck + 0.1 * radius)]
-        color = color_of(index) if leg["actuated"] else PALE
-        cylinder = [
-            Piece("neck", STEEL, lathe([*neck, (0.0, size.neck + 0.1 * radius)])),
-            Piece("barrel", color, lathe(barrel)),
-            Piece("collar", JOINT, lathe(collar, closed=True)),
-        ]
-        shaft = tube((0.0, -size.shaft, 0.0), (0.0, 0.0, 0.0), 0.55 * radius)
-        return (
-            Link(f"cylinder {name}", "cylinder", index, (*cylinder, *_on_leg(leg["base"], radius))),
-            Link(
-                f"piston {name}",
-                "piston",
-                index,
-                (Piece("shaft", STEEL, shaft), *_on_leg(leg["platform"], radius)),
-            ),
-        )
+        pieces = zip(drive.links, DRAWINGS[drive].pieces(drawn), strict=True)
+        return [Link(f"{kind} {name}", kind, index, tuple(own)) for kind, own in pieces]
 
 
 def leg_radii(mech: Mechanism) -> list[float]:
     """Radii with which the struts are drawn, m."""
     return [leg["radius"] or RADIUS * mech.characteristic_length for leg in mech.geometry["legs"]]
-
-
-class _LegSizes(NamedTuple):
-    neck: float
-    """From B to the barrel, m."""
-    body: float
-    """From B to the barrel's mouth."""
-    collar: float
-    """Length of the collar at the mouth."""
-    shaft: float
-    """Of the piston, from b into the barrel."""
-
-
-def _leg_sizes(stroke: Array, home: float, radius: float) -> _LegSizes:
-    """Lengths of cylinder and piston, m.
-
-    The barrel has four fifths of the shortest length, or as much more, up to nine tenths, as the piston needs
-    to stay in it at the longest.
-    """
-    shortest, longest = float(stroke[0]), float(stroke[1])
-    if not shortest > 0.0:
-        shortest = min(NOMINAL_STROKE[0] * home, longest / 2.0)
-    if not np.isfinite(longest):
-        longest = max(NOMINAL_STROKE[1] * home, shortest)
-    neck = min(2.4 * radius, 0.15 * shortest)
-    guide = min(2.0 * radius, 0.1 * shortest)
-    body = float(np.clip(longest - shortest + neck + guide + 0.5 * radius, 0.8 * shortest, 0.9 * shortest))
-    return _LegSizes(neck, body, min(1.5 * radius, 0.3 * (body - neck)), longest - body + guide)
-
-
-def _on_leg(joint: dict[str, Any], radius: float, at: ArrayLike = (0.0, 0.0, 0.0)) -> list[Piece]:
-    """Solid of a joint on the leg: the ball, or the pin along n."""
-    match joint["joint"]:
-        case "S":
-            return [Piece("ball", JOINT, ball(at, 1.45 * radius))]
-        case "U" | "R":
-            return [Piece("pin", JOINT, _pin(at, (1.0, 0.0, 0.0), radius))]
-    return []
-
-
-def _pin(at: ArrayLike, axis: ArrayLike, radius: float) -> Trimesh:
-    at, step = np.asarray(at, float), np.asarray(axis, float) * (2.0 * radius / np.linalg.norm(axis))
-    return tube(at - step, at + step, 0.75 * radius)
 
 
 def _plate_normal(points: Array, towards: Array) -> Array:

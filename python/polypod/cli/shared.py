@@ -19,7 +19,6 @@ if TYPE_CHECKING:
 
 from polypod.summary.tables import Table as Words
 from polypod.summary.tables import fixed as fixed
-from polypod.summary.tables import range_mm as range_mm
 from polypod.summary.tables import significant as significant
 
 MechanismArgument = Annotated[

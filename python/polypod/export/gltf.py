@@ -16,10 +16,12 @@ import trimesh
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from polypod.bodies.links import Link, Piece, link_frames, links_of
+from polypod.bodies.links import Link, link_frames, links_of
 from polypod.bodies.palette import rgb
+from polypod.bodies.pieces import Piece
 from polypod.errors import ExportError
 from polypod.files.glb import Y_UP, glb_of, linear_rgb, unused_name
+from polypod.legs.drives import LINK_PLACE
 from polypod.mechanism import Mechanism
 from polypod.vectors import inverse
 
@@ -101,16 +103,14 @@ def _parents(mech: Mechanism, links: tuple[Link, ...]) -> list[int | None]:
     index = {(link.kind, link.index): i for i, link in enumerate(links)}
     found: list[int | None] = []
     for link in links:
-        match link.kind:
-            case "base" | "platform":
-                found.append(None)
-            case "rod" | "carriage":
-                found.append(index["base", 0])
-            case "cylinder":
+        match LINK_PLACE.get(link.kind):
+            case 0:
                 rod = mech.geometry["legs"][link.index]["base"]["rod"]
                 found.append(index["base", 0] if rod is None else index["rod", rod])
-            case "piston" | "strut":
-                found.append(index["cylinder" if link.kind == "piston" else "carriage", link.index])
+            case 1:
+                found.append(index[mech.drives[link.index].links[0], link.index])
+            case None:
+                found.append(index["base", 0] if link.kind == "rod" else None)
     return found
 
 

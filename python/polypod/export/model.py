@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from polypod import _core
 from polypod.export.names import Names, printable
+from polypod.legs.drives import kinds_among
 from polypod.mechanism import Mechanism
 from polypod.multibody.closing import ClosingJoint, closing_joints
 from polypod.multibody.mjcf import cross_name, joint_name
@@ -74,7 +75,7 @@ class Model:
         """The leg that a link belongs to, and what the mechanism says of it."""
         legs = self.mech.geometry["legs"]
         for parts, leg in zip(self.tree.legs, legs, strict=True):
-            if body.name in (parts.cylinder, parts.piston):
+            if body.name in (parts.first, parts.second):
                 return parts, leg
         return None
 
@@ -89,7 +90,7 @@ class Model:
         if body.name == parts.slide:
             stroke = _range(leg["stroke"])
             return stroke and Range(stroke.least - parts.coordinate, stroke.greatest - parts.coordinate)
-        return _range(leg["base"]["range"]) if leg["base"]["joint"] == "R" and i == 0 else None
+        return _range(leg["base"]["range"]) if i == 0 else None
 
     def closing_range(self, index: int) -> Range | None:
         """The limits of a leg's platform joint, if it is revolute."""
@@ -105,10 +106,7 @@ class Model:
             f"{self.mech.name}: {format}, written by Polypod {_core.__version__}.",
             "Units: m, kg, s, rad. A leg's links have the axes (n, delta, n x delta) at B and at b.",
         ]
-        if any(leg.rail is not None for leg in self.tree.legs):
-            facts.append(
-                "Carriages have the base's axes, struts (n, delta, n x delta), both at the base joint."
-            )
+        facts += [drive.frames for drive in kinds_among(self.mech.drives) if drive.frames]
         renamed = [f"{given} is {name}" for given, name in self.names.changed("link").items()]
         if renamed:
             facts.append(f"Names: {'; '.join(renamed)}.")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection
 
 from polypod.export.model import Model
-from polypod.multibody.tree import CARRIAGE
+from polypod.legs.drives import kinds_among
 
 STROKES = frozenset({"stroke min", "stroke max"})
 TURNS = frozenset({"base angle", "rod angle"})
@@ -44,17 +44,11 @@ def lost(model: Model, limits: Collection[str], *, gravity: bool) -> list[str]:
             f"links that have no mass in the mechanism file have {model.thin[0]:g} kg here, because engines "
             f"divide by masses: {', '.join(model.massless)}."
         )
-    carriages = [
-        body.name
-        for body in model.tree.bodies
-        if body.mass > 0.0 and any(leg.rail is not None and leg.slide == body.name for leg in model.tree.legs)
-    ]
-    if carriages:
-        notes.append(
-            "carriages, which do not rotate, have no moment of inertia in the mechanism file; here they have "
-            f"those of a radius of gyration of {CARRIAGE:g} of their struts' lengths, of no effect: "
-            f"{', '.join(carriages)}."
-        )
+    for drive in kinds_among(model.mech.drives):
+        links = [leg.first for leg in model.tree.legs if leg.drive == drive]
+        massive = [body.name for body in model.tree.bodies if body.mass > 0.0 and body.name in links]
+        if drive.assumed_inertia and massive:
+            notes.append(f"{drive.assumed_inertia}: {', '.join(massive)}.")
     mobility = model.mech.mobility()
     if mobility.redundant:
         notes.append(

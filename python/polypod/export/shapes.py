@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 import trimesh
 from numpy.typing import NDArray
 
+from polypod.bodies.drives import DRAWINGS
 from polypod.bodies.links import Link, leg_radii, links_of
 from polypod.bodies.palette import PALE, color_of
-from polypod.bodies.rails import way
+from polypod.legs.drives import LINK_PLACE
 from polypod.mechanism import Mechanism
 from polypod.multibody.placement import leg_bodies, rod_body
 from polypod.vectors import perpendiculars, unit
@@ -20,8 +21,6 @@ Array = NDArray[np.float64]
 
 PLAIN = "#9AA0A6"
 """Of simple shapes that are no legs."""
-PART = 0.6
-"""Length of a simple cylinder and piston, by the leg's length at home."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,12 +47,10 @@ class Shape:
 def body_name(mech: Mechanism, link: Link) -> str:
     """The multibody description's name of a link."""
     spec = mech.geometry
-    match link.kind:
-        case "rod":
-            return rod_body(spec["rods"][link.index])
-        case "cylinder" | "piston" | "carriage" | "strut":
-            return leg_bodies(spec["legs"][link.index])[link.kind in ("piston", "strut")]
-    return link.kind
+    if link.kind == "rod":
+        return rod_body(spec["rods"][link.index])
+    place = LINK_PLACE.get(link.kind)
+    return link.kind if place is None else leg_bodies(spec["legs"][link.index])[place]
 
 
 def meshes(mech: Mechanism) -> dict[str, list[Shape]]:
@@ -90,13 +87,15 @@ def simple(mech: Mechanism) -> dict[str, list[Shape]]:
         shapes[rod_body(rod)] = [_bar(f"{rod_body(rod)} bar", ends, 0.6 * radius, PLAIN)]
     for i, leg in enumerate(spec["legs"]):
         color = color_of(i) if leg["actuated"] else PALE
-        if leg["slider"] is None:
-            shapes |= _telescope(leg, PART * float(lengths[i]), radii[i], color)
-            shapes["base"].append(_ball(f"base ball {leg['name']}", leg["base"]["point"], 1.2 * radii[i]))
-        else:
-            shapes |= _slider(leg, radii[i], color)
-            rail = way(leg, float(lengths[i]))
-            shapes["base"].append(_bar(f"base rail {leg['name']}", rail, 0.6 * radii[i], PLAIN))
+        drawing, home = DRAWINGS[mech.drives[i]], float(lengths[i])
+        for body, bar in zip(leg_bodies(leg), drawing.bars(leg, radii[i], home), strict=True):
+            shapes[body] = [_bar(f"{body} bar", bar.ends, bar.radius, color)]
+        way = drawing.way(leg, home)
+        shapes["base"].append(
+            _ball(f"base ball {leg['name']}", leg["base"]["point"], 1.2 * radii[i])
+            if way is None
+            else _bar(f"base rail {leg['name']}", way, 0.6 * radii[i], PLAIN)
+        )
         shapes["platform"].append(
             _ball(f"platform ball {leg['name']}", leg["platform"]["point"], 1.2 * radii[i])
         )
@@ -104,26 +103,6 @@ def simple(mech: Mechanism) -> dict[str, list[Shape]]:
         if np.linalg.norm(spoke[1]) > radii[i]:
             shapes["platform"].append(_bar(f"platform spoke {leg['name']}", spoke, 0.5 * radii[i], PLAIN))
     return shapes
-
-
-def _telescope(leg: dict[str, Any], part: float, radius: float, color: str) -> dict[str, list[Shape]]:
-    """Of cylinder and piston, each `part` long."""
-    shapes = {}
-    for body, end, r in zip(leg_bodies(leg), (part, -part), (radius, 0.55 * radius), strict=True):
-        ends = np.array([[0.0, 0.0, 0.0], [0.0, end, 0.0]])
-        shapes[body] = [_bar(f"{body} bar", ends, r, color)]
-    return shapes
-
-
-def _slider(leg: dict[str, Any], radius: float, color: str) -> dict[str, list[Shape]]:
-    """Of carriage and strut."""
-    carriage, strut = leg_bodies(leg)
-    half = radius * unit(leg["slider"]["axis"])
-    ends = np.array([[0.0, 0.0, 0.0], [0.0, leg["slider"]["strut"], 0.0]])
-    return {
-        carriage: [_bar(f"{carriage} bar", np.array([-half, half]), 1.4 * radius, color)],
-        strut: [_bar(f"{strut} bar", ends, 0.6 * radius, color)],
-    }
 
 
 def _ball(name: str, center: list[float], radius: float) -> Shape:

@@ -130,7 +130,7 @@ class _Writer:
             return
         number = len(self._loops) + 1
         start, place = piston, joint.frames[0]
-        if joint.kind in "UR":
+        if any(freedom.kind == "revolute" for freedom in joint.freedoms):
             start, place = f"leg {leg} platform joint end", np.eye(4)
             ranges = [model.closing_range(index)]
             self._chain(piston, start, joint.frames[0], joint.freedoms, ranges, None, NO_LIMIT)

@@ -8,6 +8,7 @@ from annotated_types import Len
 from pydantic import Discriminator, Field, Strict, Tag
 
 from polypod.files.tables import Count, Name, Number, Table, Vector
+from polypod.legs.joints import JointLetter
 
 _FORMS = {
     "point": "[x, y, z] or { radius, angle, z }",
@@ -191,7 +192,7 @@ class Cone(Part):
 class Joint(Part):
     """A leg's joint, in the axes of its body."""
 
-    joint: Literal["S", "U", "R", "F"]
+    joint: JointLetter
     point: Point
     axis: Axis | None = None
     normal: Axis | None = None
@@ -218,11 +219,6 @@ class Leg(Part):
     piston: Link | None = None
     carriage: Carriage | None = None
     strut: Link | None = None
-
-
-TELESCOPE_LINKS = ("cylinder", "piston")
-SLIDER_LINKS = ("carriage", "strut")
-"""The two links of a leg, from the base on."""
 
 
 class Limits(Part):

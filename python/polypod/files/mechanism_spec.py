@@ -7,17 +7,14 @@ its leg) the core checks, on all parts that could be read.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
 
 from polypod.errors import Fault, alternatives, place_of, shown
 from polypod.files.mechanism_schema import (
-    SLIDER_LINKS,
-    TELESCOPE_LINKS,
     Body,
-    Carriage,
     Dynamics,
     Header,
     Home,
@@ -31,11 +28,12 @@ from polypod.files.mechanism_schema import (
     Published,
     Range,
     Rod,
-    Slider,
     Tool,
 )
 from polypod.files.tables import read_table
 from polypod.files.units import MECHANISM_KINDS, Units, cos_sin, from_si, read_units
+from polypod.legs.drives import DRIVES, KEYED, LINK_PLACE, TELESCOPE
+from polypod.legs.joints import CARRIED, JOINTS
 
 STANDARD_GRAVITY = (0.0, 0.0, -9.81)
 """m/s^2 in base axes, where the file gives none."""
@@ -128,20 +126,29 @@ def read_spec(data: dict[str, Any]) -> tuple[dict[str, Any], list[Fault]]:
 def _kinds(data: object) -> Iterator[str]:
     """Kinds of the quantities that occur anywhere in `data`."""
     if isinstance(data, dict):
+        kinds = _kinds_of_keys(data)
         for key, value in data.items():
-            if key in KIND_OF_KEY:
-                yield KIND_OF_KEY[key]
+            if key in kinds:
+                yield kinds[key]
             yield from _kinds(value)
     elif isinstance(data, (list, tuple)):
         for value in data:
             yield from _kinds(value)
 
 
+def _kinds_of_keys(table: dict[str, Any]) -> dict[str, str]:
+    """Kinds of quantities under the keys of a table: in that of a leg its drive's own."""
+    drive = next((drive for key, drive in KEYED.items() if key in table), None)
+    own = {} if drive is None else {"stroke": drive.coordinate_kind, "force": drive.force_kind}
+    return KIND_OF_KEY | own
+
+
 def _quantities(value: object, kind: str | None = None, *path: str | int) -> Iterator[_Quantity]:
     """Every number that has a kind, with its place and the kind."""
     if isinstance(value, dict):
+        kinds = _kinds_of_keys(value)
         for key, entry in value.items():
-            yield from _quantities(entry, KIND_OF_KEY.get(key, kind), *path, key)
+            yield from _quantities(entry, kinds.get(key, kind), *path, key)
     elif isinstance(value, (list, tuple)):
         for i, entry in enumerate(value, 1):
             yield from _quantities(entry, kind, *path, i)
@@ -194,26 +201,26 @@ def _leg(
     leg = read_table(Leg, data, place, faults)
     if leg is None:
         return None
-    if leg.slider is None and isinstance(data, dict) and "slider" in data:
+    if isinstance(data, dict) and any(key in data and getattr(leg, key) is None for key in KEYED):
         return None  # its faults are known, and which links it may have is not
-    own, others, of = SLIDER_LINKS, TELESCOPE_LINKS, "a slider"
-    if leg.slider is None:
-        own, others, of = TELESCOPE_LINKS, SLIDER_LINKS, "a telescopic leg (one without slider)"
-    for key in others:
-        if getattr(leg, key) is not None:
-            faults.append(Fault(f"{place}.{key}", f"must not be given; {of} has {' and '.join(own)}"))
+    drive = next((drive for key, drive in KEYED.items() if getattr(leg, key) is not None), TELESCOPE)
+    of = drive.name if drive.key else f"{drive.name} (one without {' or '.join(KEYED)})"
+    for key in (*KEYED, *LINK_PLACE):
+        if key not in (drive.key, *drive.links) and getattr(leg, key) is not None:
+            message = f"must not be given; a {of} has {' and '.join(drive.links)}"
+            faults.append(Fault(f"{place}.{key}", message))
     base = _joint(leg.base, f"{place}.base", rod_names, units, faults)
     platform = _joint(leg.platform, f"{place}.platform", None, units, faults)
     if base is None or platform is None:
         return None
-    above = leg.piston or leg.strut
+    above = next(filter(None, (getattr(leg, drive.links[1]) for drive in DRIVES)), None)
     return {
         "name": str(number) if leg.name is None else leg.name,
         "actuated": leg.actuated,
-        "slider": leg.slider and _slider(leg.slider, leg.carriage, units),
-        "stroke": leg.stroke and units.vector((leg.stroke.min, leg.stroke.max), "length"),
+        **{key: read(leg, units) for key, read in DRIVE_TABLES.items()},
+        "stroke": leg.stroke and units.vector((leg.stroke.min, leg.stroke.max), drive.coordinate_kind),
         "radius": None if leg.radius is None else units.si(leg.radius, "length"),
-        "force": _range(leg.force, "force", units),
+        "force": _range(leg.force, drive.force_kind, units),
         "base": base,
         "platform": platform,
         "cylinder": leg.cylinder and _link(leg.cylinder, +1, units),
@@ -221,17 +228,26 @@ def _leg(
     }
 
 
-def _slider(slider: Slider, carriage: Carriage | None, units: Units) -> dict[str, Any]:
-    return {
-        "axis": _axis(slider.axis, units),
-        "strut": units.si(slider.strut, "length"),
-        "branch": float(slider.branch),
-        "carriage": carriage
-        and {
-            "mass": units.si(carriage.mass, "mass"),
-            "center": units.vector(carriage.center, "length"),
-        },
-    }
+def _slider(leg: Leg, units: Units) -> dict[str, Any] | None:
+    slider, carriage = leg.slider, leg.carriage
+    return (
+        None
+        if slider is None
+        else {
+            "axis": _axis(slider.axis, units),
+            "strut": units.si(slider.strut, "length"),
+            "branch": float(slider.branch),
+            "carriage": carriage
+            and {
+                "mass": units.si(carriage.mass, "mass"),
+                "center": units.vector(carriage.center, "length"),
+            },
+        }
+    )
+
+
+DRIVE_TABLES: dict[str, Callable[[Leg, Units], dict[str, Any] | None]] = {"slider": _slider}
+"""What the core is told of a drive, by the key of its table in a leg; None where the leg has another one."""
 
 
 def _joint(
@@ -239,8 +255,9 @@ def _joint(
 ) -> dict[str, Any] | None:
     """`rod_names` is None on the platform, which carries no rods. None where the rod is unknown."""
     letter, axis, normal, rod = joint.joint, joint.axis, joint.normal, joint.rod
-    on_rod = letter == "R" and rod is not None and rod_names is not None
-    may_have = {"axis": letter != "S" and not on_rod, "normal": letter == "F"}
+    kind = JOINTS[letter]
+    on_rod = kind.on_rod and rod is not None and rod_names is not None
+    may_have = {"axis": kind.has_axis and not on_rod, "normal": kind.has_normal}
     for key, value in {"axis": axis, "normal": normal}.items():
         if may_have[key] and value is None:
             faults.append(Fault(f"{place}.{key}", f"is missing; a {letter} joint needs it"))
@@ -249,8 +266,8 @@ def _joint(
             faults.append(Fault(f"{place}.{key}", f"must not be given; {of}"))
     if rod is not None and rod_names is None:
         faults.append(Fault(f"{place}.rod", "a rod carries base joints only"))
-    elif rod is not None and letter != "R":
-        faults.append(Fault(f"{place}.joint", f"is {letter}; on a rod it must be R"))
+    elif rod is not None and not kind.on_rod:
+        faults.append(Fault(f"{place}.joint", f"is {letter}; on a rod it must be {CARRIED}"))
     if rod is not None and rod_names is not None and rod not in rod_names:
         names = [name for name in rod_names if isinstance(name, str) and name.isprintable() and name.strip()]
         faults.append(Fault(f"{place}.rod", f"is {shown(rod)}, no rod's name; {alternatives(rod, names)}"))

@@ -29,6 +29,14 @@ UNITS: dict[str, dict[str, tuple[float, float]]] = {
 MECHANISM_KINDS = ("length", "angle", "mass", "inertia", "force", "torque", "acceleration")
 MOTION_KINDS = ("time", "length", "angle", "force", "torque")
 
+SHOWN: dict[str, tuple[float, str]] = {
+    "length": (1e3, "mm"),
+    "angle": (180 / math.pi, "deg"),
+    "force": (1.0, "N"),
+    "torque": (1.0, "N m"),
+}
+"""Units that people read quantities in, and the factors to them from SI, by kind."""
+
 
 KIND_OF_COORDINATE: dict[str, str | None] = {
     **dict.fromkeys(("x", "y", "z", "p", "h", "tip_x", "tip_y", "tip_z"), "length"),
@@ -64,9 +72,9 @@ def from_si(value: Value, kind: str, unit: str) -> Value:
 
 
 def readable(value: float, unit: str) -> str:
-    """A number in m, rad, N or 1 as people read it: in mm, deg, N or as it is."""
-    factor, name = {"m": (1e3, " mm"), "rad": (180 / math.pi, " deg"), "N": (1.0, " N")}.get(unit, (1.0, ""))
-    return f"{factor * value:.1f}{name}" if name else f"{value:.3g}"
+    """A number in SI as people read it: in mm, deg, N, N m or as it is."""
+    factor, name = next((shown for kind, shown in SHOWN.items() if si_unit(kind) == unit), (1.0, ""))
+    return f"{factor * value:.1f} {name}" if name else f"{value:.3g}"
 
 
 def cos_sin(angle: float, unit: str) -> tuple[float, float]:

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from polypod.legs.joints import JointLetter
 from polypod.multibody.tree import POINT, Closure, Freedom, Multibody, Y
 from polypod.vectors import cross, frame_at, unit
 
@@ -19,7 +19,7 @@ class ClosingJoint:
     """The joint between a piston or strut and the platform that closes the loop of a leg."""
 
     name: str
-    kind: Literal["S", "U", "R", "F"]
+    kind: JointLetter
     bodies: tuple[str, str]
     """Piston and platform."""
     frames: tuple[Array, Array]
@@ -49,7 +49,7 @@ def closing_joint(tree: Multibody, closure: Closure) -> ClosingJoint:
         return other * np.sign((across @ other) @ mine)
 
     freedoms: tuple[Freedom, ...] = ()
-    kind: Literal["S", "U", "R", "F"]
+    kind: JointLetter
     match closure.squares:
         case ():
             kind, freedoms, turn = "S", (Freedom("spherical", POINT),), across.T

@@ -1,7 +1,8 @@
 """Where the links of a mechanism are at a pose of the platform, from points and axes alone.
 
-A leg's frame is (n, δ, n×δ), as the mechanism file's format defines it; a rod's is (L, n, L×n). A carriage,
-which does not rotate, has the base's. The origin is at the base joint, of a piston at the platform joint.
+A leg's frame is (n, δ, n×δ), as the mechanism file's format defines it; a rod's is (L, n, L×n). A link that
+carries the base joint, such as a carriage, has those of its drive. The origin is at the base joint, of a
+piston at the platform joint.
 """
 
 from __future__ import annotations
@@ -13,7 +14,8 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from polypod.files.mechanism_schema import SLIDER_LINKS, TELESCOPE_LINKS
+from polypod.legs.drives import drive_of
+from polypod.legs.joints import JOINTS
 from polypod.vectors import cross, frame_at, perpendiculars, unit
 
 Array = NDArray[np.float64]
@@ -40,7 +42,7 @@ class Turning:
 
 def leg_bodies(leg: Mapping[str, Any]) -> tuple[str, str]:
     """Names of a leg's two links, from the base on: cylinder and piston, or carriage and strut."""
-    first, second = TELESCOPE_LINKS if leg["slider"] is None else SLIDER_LINKS
+    first, second = drive_of(leg).links
     return f"leg {leg['name']} {first}", f"leg {leg['name']} {second}"
 
 
@@ -56,13 +58,10 @@ def turning_of(geometry: Mapping[str, Any], leg: Mapping[str, Any]) -> Turning |
     sides: tuple[Literal["base", "platform"], ...] = ("base", "platform")
     for side in sides:
         joint = leg[side]
-        match joint["joint"]:
-            case "U":
-                return Turning(side, unit(joint["axis"]), along=False)
-            case "R":
-                return Turning(side, unit(joint["axis"]), along=True)
-            case "F":
-                return Turning(side, unit(joint["normal"]), along=True)
+        kind = JOINTS[joint["joint"]]
+        if kind.normal != "free":
+            axis = joint["normal"] if kind.has_normal else joint["axis"]
+            return Turning(side, unit(axis), along=kind.normal == "along")
     return None
 
 
@@ -75,7 +74,8 @@ def placements(geometry: Mapping[str, Any], pose: Array, *, zero: bool = False) 
     normals: dict[int, Array] = {}
     for leg in geometry["legs"]:
         end = pose[:3, :3] @ leg["platform"]["point"] + pose[:3, 3]
-        start = _base_joint(leg, end)
+        drive = drive_of(leg)
+        start = drive.foot(leg, end)
         delta = unit(end - start)
         n = _normal(turning_of(geometry, leg), pose, delta)
         rod = leg["base"]["rod"]
@@ -86,32 +86,16 @@ def placements(geometry: Mapping[str, Any], pose: Array, *, zero: bool = False) 
         delta = unit(delta - n * (n @ delta))
         axes = np.column_stack([n, delta, cross(n, delta)])
         lower, upper = leg_bodies(leg)
-        if leg["slider"] is None:
+        if drive.moves_foot:
+            found[lower] = frame_at(drive.first_axes(leg, start), start)
+            found[upper] = frame_at(axes, start)
+        else:
             found[lower] = frame_at(axes, start)
             found[upper] = frame_at(axes, start + delta * np.linalg.norm(end - start))
-        else:
-            found[lower] = frame_at(np.eye(3), start)
-            found[upper] = frame_at(axes, start)
     for k, rod in enumerate(geometry["rods"]):
         line, n = unit(rod["axis"]), normals[k]
         found[rod_body(rod)] = frame_at(np.column_stack([line, n, cross(line, n)]), rod["point"])
     return found
-
-
-def _base_joint(leg: Mapping[str, Any], end: Array) -> Array:
-    """Where a leg's base joint is, with its platform joint at `end`.
-
-    Of a slider it is one of the two points on the rail that are a strut's length away: the one from which
-    the strut leans along the axis (branch 1) or against it (-1). NaN where there is none.
-    """
-    start, slider = np.array(leg["base"]["point"]), leg["slider"]
-    if slider is None:
-        return start
-    axis = unit(slider["axis"])
-    nearest = start + axis * (axis @ (end - start))
-    with np.errstate(invalid="ignore"):
-        half_chord = np.sqrt(slider["strut"] ** 2 - np.sum((end - nearest) ** 2))
-    return np.asarray(nearest - slider["branch"] * half_chord * axis)
 
 
 def _normal(turning: Turning | None, pose: Array, delta: Array) -> Array:

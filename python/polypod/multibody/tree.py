@@ -14,6 +14,8 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from polypod.legs.drive import Drive
+from polypod.legs.drives import drive_of
 from polypod.mechanism import Mechanism
 from polypod.multibody.placement import (
     BASE,
@@ -31,8 +33,6 @@ Array = NDArray[np.float64]
 X, Y, Z = np.eye(3)
 """Axes of a leg's links, n, δ, n×δ; and of a rod's: L, n, L×n."""
 POINT = np.zeros(3)
-CARRIAGE = 0.1
-"""Radius of gyration of a carriage, by the length of its strut."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,32 +76,40 @@ class Closure:
 
 @dataclass(frozen=True, eq=False)
 class LegParts:
-    """The links of a leg, its prismatic and its base joint."""
+    """The links of a leg, its drive and its base joint."""
 
     name: str
-    cylinder: str
-    """Of a slider the carriage."""
-    piston: str
-    """Of a slider the strut."""
-    slide: str
-    """The link that the prismatic joint moves: the piston, or the carriage."""
-    hinge: str
-    """The link that the base joint rotates: the cylinder, or the strut."""
+    first: str
+    """The link on the base's side: the cylinder, or of a slider the carriage."""
+    second: str
+    """That on the platform's side: the piston, or the strut."""
     actuated: bool
     coordinate: float
-    """Distance from B to b, or place of the carriage on its rail, where the prismatic joint is at zero, m."""
+    """The drive's coordinate where its joint is at zero, m or rad."""
     spins: bool
     """Whether the leg may rotate freely about its own axis."""
-    rail: tuple[Array, Array] | None
-    """(3,) each: the point and the unit vector of a slider's rail, base axes."""
+    drive: Drive
+    geometry: Mapping[str, Any]
+    """The leg in `Mechanism.geometry`."""
+
+    @property
+    def slide(self) -> str:
+        """The link that the drive moves: the piston, or the carriage."""
+        return self.first if self.drive.moves_foot else self.second
+
+    @property
+    def hinge(self) -> str:
+        """The link that the base joint rotates: the cylinder, or the strut."""
+        return self.second if self.drive.moves_foot else self.first
+
+    @property
+    def axis(self) -> Array:
+        """(3,): of the drive's joint, a unit vector in the axes of the link that it moves."""
+        return self.drive.axis(self.geometry)
 
     def coordinate_at(self, placements: Placements) -> float:
-        """The prismatic joint's coordinate with the links at `placements`, m."""
-        first, second = (placements[body][:3, 3] for body in (self.cylinder, self.piston))
-        if self.rail is None:
-            return float(np.linalg.norm(second - first))
-        point, axis = self.rail
-        return float(axis @ (first - point))
+        """The drive's coordinate with the links at `placements`."""
+        return self.drive.coordinate_at(self.geometry, placements[self.first], placements[self.second])
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,10 +149,10 @@ def describe(mech: Mechanism) -> Multibody:
     bodies, closures, parts = _rods(geometry, zero), [], []
     for leg in geometry["legs"]:
         part = _leg_parts(geometry, leg, zero)
-        bodies += (_telescope if part.rail is None else _slider)(geometry, leg, part, zero)
+        bodies += _leg(geometry, part, zero)
         squares = _platform_squares(leg["platform"])
         name = f"leg {part.name} platform joint"
-        closures.append(Closure(name, (part.piston, PLATFORM), _leg_ends(leg), squares))
+        closures.append(Closure(name, (part.second, PLATFORM), _leg_ends(leg), squares))
         parts.append(part)
     bodies.append(_body(PLATFORM, BASE, zero, (Freedom("free", POINT),), geometry["platform"]))
     return Multibody(
@@ -166,26 +174,26 @@ def release(tree: Multibody) -> Multibody:
     from spinning, the base joint if it does; a rod follows the first leg that it carries.
     """
     bodies, closures = [], []
-    parents = {leg.hinge: BASE if leg.rail is None else leg.cylinder for leg in tree.legs}
+    parents = {leg.hinge: leg.first if leg.drive.moves_foot else BASE for leg in tree.legs}
     for body in tree.bodies:
         ball = (Freedom("spherical", POINT),)
         freed = body.name in parents
         bodies.append(replace(body, parent=parents[body.name], freedoms=ball) if freed else body)
     for leg, parts in zip(tree.geometry["legs"], tree.legs, strict=True):
-        closures.append(Closure(f"leg {parts.name} end", (parts.piston, PLATFORM), _leg_ends(leg), ()))
+        closures.append(Closure(f"leg {parts.name} end", (parts.second, PLATFORM), _leg_ends(leg), ()))
         turning = turning_of(tree.geometry, leg)
         if turning is not None:
             # U: n is perpendicular to the axis; R and F: n is the axis, or n×δ is perpendicular to it.
             other = BASE if turning.side == "base" else PLATFORM
             pair = (Z if turning.along else X, turning.axis)
-            closures.append(Closure(f"leg {parts.name} spin", (parts.piston, other), None, (pair,)))
+            closures.append(Closure(f"leg {parts.name} spin", (parts.second, other), None, (pair,)))
     for k, rod in enumerate(tree.rods):
         leader = next(
             parts
             for leg, parts in zip(tree.geometry["legs"], tree.legs, strict=True)
             if leg["base"]["rod"] == k
         )
-        closures.append(Closure(f"{rod} turn", (rod, leader.cylinder), None, ((Y, Y),)))
+        closures.append(Closure(f"{rod} turn", (rod, leader.first), None, ((Y, Y),)))
     return replace(tree, bodies=depth_first(bodies), closures=tuple(closures))
 
 
@@ -244,51 +252,28 @@ def _body(
 
 
 def _leg_parts(geometry: Mapping[str, Any], leg: Mapping[str, Any], zero: Placements) -> LegParts:
-    first, second = leg_bodies(leg)
-    slider, spins = leg["slider"], turning_of(geometry, leg) is None
-    rail = None if slider is None else (np.array(leg["base"]["point"]), unit(slider["axis"]))
-    slide, hinge = (second, first) if rail is None else (first, second)
-    parts = LegParts(leg["name"], first, second, slide, hinge, leg["actuated"], 0.0, spins, rail)
+    spins = turning_of(geometry, leg) is None
+    parts = LegParts(leg["name"], *leg_bodies(leg), leg["actuated"], 0.0, spins, drive_of(leg), leg)
     return replace(parts, coordinate=parts.coordinate_at(zero))
 
 
 def _leg_ends(leg: Mapping[str, Any]) -> tuple[Array, Array]:
     """The platform joint in the axes of the piston, which begins there, or strut, and of the platform."""
-    reach = 0.0 if leg["slider"] is None else leg["slider"]["strut"]
-    return reach * Y, np.array(leg["platform"]["point"])
+    return drive_of(leg).reach(leg) * Y, np.array(leg["platform"]["point"])
 
 
-def _telescope(
-    geometry: Mapping[str, Any], leg: Mapping[str, Any], parts: LegParts, zero: Placements
-) -> list[Body]:
-    """Base or rod, base joint, cylinder, prismatic joint, piston."""
+def _leg(geometry: Mapping[str, Any], parts: LegParts, zero: Placements) -> list[Body]:
+    """The two links, with the base joint and the drive's joint, the one below the other."""
+    leg, drive = parts.geometry, parts.drive
     rod = leg["base"]["rod"]
     parent = BASE if rod is None else rod_body(geometry["rods"][rod])
-    turns = _base_freedoms(leg["base"], zero[parts.cylinder])
-    slide = (Freedom("prismatic", Y),)
+    turns = _base_freedoms(leg["base"], zero[parts.hinge])
+    moves = (Freedom(drive.joint, parts.axis),)
+    lower, upper = (moves, turns) if drive.moves_foot else (turns, moves)
+    first, second = drive.solid_bodies(leg)
     return [
-        _body(parts.cylinder, parent, zero, turns, leg["cylinder"]),
-        _body(parts.piston, parts.cylinder, zero, slide, leg["piston"]),
-    ]
-
-
-def _slider(
-    geometry: Mapping[str, Any], leg: Mapping[str, Any], parts: LegParts, zero: Placements
-) -> list[Body]:
-    """Base, prismatic joint, carriage, base joint, strut."""
-    carriage, strut = leg["slider"]["carriage"], leg["piston"]
-    if carriage is not None:
-        # It does not rotate, so that its inertia is of no effect; but engines want some.
-        side = CARRIAGE * float(leg["slider"]["strut"])
-        carriage = {**carriage, "inertia": carriage["mass"] * side**2 * np.eye(3)}
-    # The file counts from the platform joint, where a strut without mass has its point.
-    strut = strut or {"mass": 0.0, "center": np.zeros(3), "inertia": np.zeros((3, 3))}
-    strut = {**strut, "center": strut["center"] + _leg_ends(leg)[0]}
-    rail = (Freedom("prismatic", unit(leg["slider"]["axis"])),)
-    turns = _base_freedoms(leg["base"], zero[parts.piston])
-    return [
-        _body(parts.cylinder, BASE, zero, rail, carriage),
-        _body(parts.piston, parts.cylinder, zero, turns, strut),
+        _body(parts.first, parent, zero, lower, first),
+        _body(parts.second, parts.first, zero, upper, second),
     ]
 
 

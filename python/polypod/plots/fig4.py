@@ -7,9 +7,12 @@ import itertools
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
+from numpy.typing import NDArray
 
-from polypod.answers.leg_words import word
+from polypod.answers.leg_words import factor, force_unit, unit, word
 from polypod.answers.status import Status, count
+from polypod.legs.drive import Drive
+from polypod.legs.drives import TELESCOPE
 from polypod.mechanism import Mechanism
 from polypod.plots.canvas import Canvas, cells, pyplot_figure, size_of
 from polypod.plots.scene import math_name
@@ -83,14 +86,18 @@ def fig4_panels(data: xr.Dataset) -> list[Panel]:
         values = scale * data[name].to_numpy()[:, 3 * part : 3 * part + 3]
         return Panel(label, unit, values, tuple(f"${symbol}_{c}$" for c in _COMPONENTS))
 
-    def of_legs(name: str, label: str, symbol: str, unit: str, scale: float = 1.0) -> Panel:
+    def of_legs(
+        name: str, label: str, symbol: str, unit: str, scale: float | NDArray[np.float64] = 1.0
+    ) -> Panel:
         curves = tuple(f"${symbol.replace('#', leg)}$" for leg in legs)
         values = scale * data[name].to_numpy()
         return Panel(label, unit, values, curves, stroke_of(data) if name == "length" else ())
 
     position = 1e3 * data["pose"].to_numpy()[:, :3, 3]
-    length, rate, gain = _symbols(data)
-    forces = of_legs("force", "active force $f_a$", "f_{a#}", "N")
+    drives = _drives_of(data)
+    length, rate, gain = _symbols(drives)
+    scale, own = np.array([factor(drive) for drive in drives]), unit(drives)
+    forces = of_legs("force", "active force $f_a$", "f_{a#}", force_unit(drives))
     panels = [
         Panel("position of $o$", "mm", position, ("$X_o$", "$Y_o$", "$Z_o$")),
         six("twist", 0, "velocity $v$", "v", "mm s$^{-1}$", 1e3),
@@ -98,9 +105,9 @@ def fig4_panels(data: xr.Dataset) -> list[Panel]:
         six("twist", 1, r"angular velocity $\omega$", r"\omega", "rad s$^{-1}$"),
         six("acceleration", 1, r"angular acceleration $\varepsilon$", r"\varepsilon", "rad s$^{-2}$"),
         _orientation(data),
-        of_legs("length", *length, "mm", 1e3),
-        of_legs("rate", *rate, "mm s$^{-1}$", 1e3),
-        of_legs("leg_acceleration", *gain, "mm s$^{-2}$", 1e3),
+        of_legs("length", *length, own, scale),
+        of_legs("rate", *rate, f"{own} s$^{{-1}}$", scale),
+        of_legs("leg_acceleration", *gain, f"{own} s$^{{-2}}$", scale),
         in_kilo(forces),
         _second_forces(data),
         _torque(data),
@@ -108,9 +115,9 @@ def fig4_panels(data: xr.Dataset) -> list[Panel]:
     return [panel for panel in panels if panel is not None]
 
 
-def _symbols(data: xr.Dataset) -> tuple[tuple[str, str], tuple[str, str], tuple[str, str]]:
-    """Label and symbol of what the prismatic joints have, of its rate and of its second rate."""
-    of = _word_of(data)
+def _symbols(drives: tuple[Drive, ...]) -> tuple[tuple[str, str], tuple[str, str], tuple[str, str]]:
+    """Label and symbol of the drives' coordinates, of their rates and of their second rates."""
+    of = word(drives)
     if of == "length":
         return (
             ("leg length $r$", "r_{#}"),
@@ -170,7 +177,7 @@ def _torque(data: xr.Dataset) -> Panel:
     return Panel("smallest singular value", "", values, (r"$\sigma_\mathrm{min}$",))
 
 
-def _word_of(data: xr.Dataset) -> str:
-    """Word for the coordinate of the prismatic joints; "length" where the dataset holds no mechanism."""
+def _drives_of(data: xr.Dataset) -> tuple[Drive, ...]:
+    """What drives the legs; telescopes where the dataset does not tell its mechanism."""
     text = data.attrs.get("mechanism_file")
-    return word(Mechanism.from_toml(text).leg_letters) if text else "length"
+    return Mechanism.from_toml(text).drives if text else (TELESCOPE,) * data.sizes["leg"]

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
-from functools import partial
+from collections.abc import Iterable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,52 +15,23 @@ from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # type: ignore[import-u
 from numpy.typing import NDArray
 from trimesh import Trimesh
 
-from polypod.bodies.links import JOINT, Link, leg_radii, link_frames, links_of
+from polypod.bodies.drawing import Clip, Placed, moved
+from polypod.bodies.drives import DRAWINGS
+from polypod.bodies.links import Link, leg_radii, link_frames, links_of
 from polypod.bodies.palette import INK
+from polypod.bodies.pieces import JOINT
 from polypod.bodies.solids import four_sided, tube
+from polypod.legs.joints import JOINTS
 from polypod.mechanism import Mechanism
 from polypod.plots.canvas import size_of
 from polypod.vectors import unit
 
 Array = NDArray[np.float64]
-DrawnOut = Callable[[Array], tuple[Array, NDArray[np.bool_]]]
 
 LIGHT = np.array([-0.35, -0.55, 0.76])
 """Direction towards the light, base axes."""
 
 _HALO = [withStroke(linewidth=2.2, foreground="white", alpha=0.85)]
-
-
-def _moved(points: Array, place: Array) -> Array:
-    """Points (..., 3) in axes that stand at `place` (4, 4)."""
-    return np.asarray(points @ place[:3, :3].T + place[:3, 3])
-
-
-def _drawn_out(cylinder: Link, place: Array, corners: Array) -> tuple[Array, NDArray[np.bool_]]:
-    """A piston's faces (k, 4, 3), in axes at `place` in the cylinder's, ended at the barrel's mouth.
-
-    And which of them are left; of the cylinder's own faces only that.
-    """
-    barrel = next(piece.mesh for piece in cylinder.pieces if piece.name == "barrel")
-    (_, low, _), (radius, high, _) = barrel.bounds
-    at = _moved(corners, place)
-    within = (np.hypot(at[..., 0], at[..., 2]) < 0.9 * radius) & (low < at[..., 1]) & (at[..., 1] <= high)
-    left = ~within.all(axis=1)
-    if np.array_equal(place, np.eye(4)):
-        return corners, left
-    at[..., 1] = np.where(within, high, at[..., 1])
-    back = np.asarray(np.linalg.inv(place), np.float64)
-    return _moved(at, back), left
-
-
-def _bared(axis: Array, shoe: Array, corners: Array) -> tuple[Array, NDArray[np.bool_]]:
-    """A rail's faces (k, 4, 3) outside the block with the corners `shoe` (m, 3); and which are left."""
-    low, high = (shoe @ axis).min(), (shoe @ axis).max()
-    at = corners @ axis
-    within = (low < at) & (at < high)
-    ends = np.where((at <= low).any(axis=1), low, high)[:, None]
-    moved = corners + np.where(within, ends - at, 0.0)[..., None] * axis
-    return moved, ~within.all(axis=1)
 
 
 class _JointLabel(NamedTuple):
@@ -90,16 +60,14 @@ class Faces:
         self._normals: list[Array] = []
         self._colors: list[Array] = []
 
-    def add(
-        self, mesh: Trimesh, color: str, place: Array | None = None, drawn_out: DrawnOut | None = None
-    ) -> None:
-        """The faces of a body in axes that stand at `place` (4, 4), as far as they are drawn out."""
+    def add(self, mesh: Trimesh, color: str, place: Array | None = None, clip: Clip | None = None) -> None:
+        """The faces of a body in axes that stand at `place` (4, 4), as far as nothing hides them."""
         place = np.eye(4) if place is None else place
         corners, normals = four_sided(mesh)
-        if drawn_out is not None:
-            corners, shown = drawn_out(corners)
+        if clip is not None:
+            corners, shown = clip(corners)
             corners, normals = corners[shown], normals[shown]
-        self._corners.append(_moved(corners, place))
+        self._corners.append(moved(corners, place))
         self._normals.append(normals @ place[:3, :3].T)
         self._colors.append(np.broadcast_to(to_rgb(color), (len(corners), 3)))
 
@@ -133,19 +101,14 @@ class Scene:
         self.joint_labels: list[_JointLabel] = []
         sides = [leg[side]["joint"] for leg in spec["legs"] for side in ("base", "platform")]
         self.kinds = dict.fromkeys(sides)  # joint kinds in use, in order
-        self._rail_axes = {
-            f"rail {leg['name']}": unit(leg["slider"]["axis"])
-            for leg in spec["legs"]
-            if leg["slider"] is not None
-        }
         self._size, thick = mech.characteristic_length, max(leg_radii(mech))
-        self._add_links(links_of(mech), link_frames(mech, pose).frames)
+        self._add_links(mech, links_of(mech), link_frames(mech, pose).frames)
         vectors = mech.inverse_kinematics(pose).vectors
         platform = np.array([leg["platform"]["point"] for leg in spec["legs"]]) @ pose[:3, :3].T + pose[:3, 3]
-        # A slider's base joint is on its carriage.
+        # A drive below the base joint moves it.
         base = platform - vectors
         for i, name in enumerate(mech.leg_names):
-            below = "B" if spec["legs"][i]["slider"] is None else "Q"
+            below = "Q" if mech.moves_feet[i] else "B"
             for letter, points, leg_side in ((below, base, 1), ("b", platform, -1)):
                 text = f"${letter}_{{{math_name(name)}}}$"
                 away = points[i] - points.mean(axis=0)
@@ -166,29 +129,21 @@ class Scene:
         right, up = _right_and_up()
         return [*self.labels, *((label.place(right, up), label.text) for label in self.joint_labels)]
 
-    def _add_links(self, links: tuple[Link, ...], frames: Array) -> None:
+    def _add_links(self, mech: Mechanism, links: tuple[Link, ...], frames: Array) -> None:
         """All links; but nothing inside a barrel or a carriage: faces sorted by depth would not hide it."""
-        shoes = {
-            f"rail {link.name.removeprefix('carriage ')}": _moved(
-                np.array(link.pieces[0].mesh.vertices), place
-            )
-            for link, place in zip(links, frames, strict=True)
-            if link.kind == "carriage" and np.isfinite(place).all()
-        }
-        for k, (link, place) in enumerate(zip(links, frames, strict=True)):
-            if not np.isfinite(place).all():
-                continue  # a leg without length, which has no direction
-            # A piston comes right after its cylinder.
-            cylinder = {"cylinder": k, "piston": k - 1}.get(link.kind)
-            drawn_out = None
-            if cylinder is not None:
-                within = np.eye(4) if cylinder == k else np.linalg.inv(frames[cylinder]) @ place
-                drawn_out = partial(_drawn_out, links[cylinder], within)
-            for piece in link.pieces:
-                bared = None
-                if link.kind == "base" and piece.name in shoes:
-                    bared = partial(_bared, self._rail_axes[piece.name], shoes[piece.name])
-                self.faces.add(piece.mesh, piece.color, place, bared or drawn_out)
+        found = [Placed(link.name, link.pieces, place) for link, place in zip(links, frames, strict=True)]
+        placed = [
+            bool(np.isfinite(each.frame).all()) for each in found
+        ]  # a leg without length has no direction
+        clips: dict[tuple[str, str], Clip] = {}
+        for i, (leg, drive) in enumerate(zip(mech.geometry["legs"], mech.drives, strict=True)):
+            first = 1 + len(mech.rod_names) + 2 * i
+            if placed[first] and placed[first + 1]:
+                clips |= DRAWINGS[drive].clips(leg, found[first], found[first + 1])
+        for link, has_place in zip(found, placed, strict=True):
+            for piece in link.pieces if has_place else ():
+                clip = clips.get((link.name, piece.name)) or clips.get((link.name, ""))
+                self.faces.add(piece.mesh, piece.color, link.frame, clip)
 
     def _rod_label(self, rod: dict[str, Any], points: Array, thick: float) -> None:
         axis, start = unit(rod["axis"]), np.array(rod["point"])
@@ -269,20 +224,21 @@ def _seen(ax: Axes3D, points: Array) -> Array:
     return seen
 
 
-_JOINTS = {
-    "S": ("o", 6.0, "S  spherical"),
-    "U": ("P", 7.5, "U  universal"),
-    "R": ("$\u25ac$", 8.0, "R  revolute"),
-    "F": ("s", 5.5, "F  fixed"),
-}
-
-
 def joint_handles(kinds: Iterable[str]) -> list[Line2D]:
     """The legend of joints."""
     return [
-        Line2D([], [], linestyle="none", color=JOINT, marker=marker, markersize=size, label=text)
-        for kind, (marker, size, text) in _JOINTS.items()
-        if kind in set(kinds)
+        Line2D(
+            [],
+            [],
+            linestyle="none",
+            color=JOINT,
+            marker=marker,
+            markersize=size,
+            label=f"{letter}  {kind.name}",
+        )
+        for letter, kind in JOINTS.items()
+        for marker, size in (kind.marker,)
+        if letter in set(kinds)
     ]
 
 

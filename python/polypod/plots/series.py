@@ -13,6 +13,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
+from polypod.answers.leg_words import factor
 from polypod.answers.status import Status
 from polypod.bodies.palette import GREY, PALE, color_of
 from polypod.errors import PolypodError, UnknownNameError
@@ -195,9 +196,10 @@ def in_kilo(panel: Panel) -> Panel:
 
 
 def stroke_of(data: xr.Dataset) -> tuple[float, ...]:
-    """Stroke limits in mm, where all legs have the same and the solution tells its mechanism."""
+    """Stroke limits in mm or deg, where all legs have the same and the solution tells its mechanism."""
     text = data.attrs.get("mechanism_file")
     if not text:
         return ()
-    limits = np.unique(Mechanism.from_toml(text).stroke, axis=0)
-    return tuple(1e3 * limits[0]) if len(limits) == 1 and np.isfinite(limits).all() else ()
+    mech = Mechanism.from_toml(text)
+    limits = np.unique(mech.stroke, axis=0)
+    return tuple(factor(mech.drives[0]) * limits[0]) if len(limits) == 1 and np.isfinite(limits).all() else ()

@@ -9,6 +9,7 @@ from matplotlib.patches import FancyBboxPatch
 
 from polypod.answers.mobility import Mobility
 from polypod.bodies.palette import BLUE, GREY, INK
+from polypod.legs.drives import DRIVES
 from polypod.plots.canvas import pyplot_figure
 from polypod.plots.style import house_style
 from polypod.summary.mechanism_facts import link_kind, links_by_joints
@@ -45,7 +46,7 @@ def plot_topology(mobility: Mobility, ax: Axes | None = None) -> Axes:
 def _topology_places(mobility: Mobility) -> tuple[dict[int, tuple[float, float, float]], list[int]]:
     """Middle (x, y) and half width of each link, and the order of the legs from left to right.
 
-    Every leg has one prismatic joint and is a column; legs on one rod stand side by side.
+    Every leg has one drive and is a column; legs on one rod stand side by side.
     """
     neighbours: defaultdict[int, set[int]] = defaultdict(set)
     for joint in mobility.graph_joints:
@@ -53,33 +54,35 @@ def _topology_places(mobility: Mobility) -> tuple[dict[int, tuple[float, float, 
             neighbours[a].add(b)
 
     def links_of(slide: tuple[int, int]) -> tuple[int, int]:
-        """Cylinder and piston, or carriage and strut: the carriage slides on the base."""
-        carriage = slide[1]
-        if not mobility.graph_links[carriage].name.startswith("carriage "):
+        """The two links of a leg: between them is its drive, or it moves the first on the base."""
+        first = slide[1]
+        if mobility.graph_links[first].name.split()[0] not in carriers:
             return slide
-        return carriage, next(link for link in neighbours[carriage] if link not in _HUBS)
+        return first, next(link for link in neighbours[first] if link not in _HUBS)
 
-    sliders = [links_of(joint.links) for joint in mobility.graph_joints if joint.kind == "P"]
-    ends = {end for slider in sliders for end in slider} | {*_HUBS}
+    driven = {drive.joint for drive in DRIVES}
+    carriers = {drive.links[0] for drive in DRIVES if drive.moves_foot}
+    columns = [links_of(joint.links) for joint in mobility.graph_joints if joint.name.split()[0] in driven]
+    ends = {end for links in columns for end in links} | {*_HUBS}
     rods = [i for i in range(mobility.links) if i not in ends]
 
     def rod_of(leg: int) -> int | None:
-        return next((rod for rod in rods if rod in neighbours[sliders[leg][0]]), None)
+        return next((rod for rod in rods if rod in neighbours[columns[leg][0]]), None)
 
     def group(leg: int) -> int:
         """The first leg on the same rod."""
         rod = rod_of(leg)
-        return leg if rod is None else min(other for other in range(len(sliders)) if rod_of(other) == rod)
+        return leg if rod is None else min(other for other in range(len(columns)) if rod_of(other) == rod)
 
-    order = sorted(range(len(sliders)), key=lambda leg: (group(leg), leg))
+    order = sorted(range(len(columns)), key=lambda leg: (group(leg), leg))
     place: dict[int, tuple[float, float, float]] = {}
     for column, leg in enumerate(order):
-        for link, height in zip(sliders[leg], (2.15, 3.2), strict=True):
+        for link, height in zip(columns[leg], (2.15, 3.2), strict=True):
             place[link] = (column, height, 0.36)
     for rod in rods:
-        columns = [column for column, leg in enumerate(order) if rod_of(leg) == rod] or [0]
-        half = (columns[-1] - columns[0]) / 2
-        place[rod] = (columns[0] + half, 1.05, half + 0.36)
+        on = [column for column, leg in enumerate(order) if rod_of(leg) == rod] or [0]
+        half = (on[-1] - on[0]) / 2
+        place[rod] = (on[0] + half, 1.05, half + 0.36)
     half = (len(order) - 1) / 2
     for hub, height in zip(_HUBS, (0.0, 4.3), strict=True):
         place[hub] = (half, height, half + 0.42)

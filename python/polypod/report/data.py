@@ -5,6 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+from polypod.files.units import SHOWN
+from polypod.legs.drive import Drive
+from polypod.legs.drives import drive_of, kinds_among
 from polypod.mechanism import Mechanism
 from polypod.summary.tables import Table
 
@@ -12,7 +15,8 @@ from polypod.summary.tables import Table
 def data_tables(mech: Mechanism) -> list[Table]:
     """Joints, links, rods, load and the rest of the settings."""
     spec = mech.geometry
-    tables = (_joints(mech, spec), _rails(spec), _rods(spec), _links(mech, spec), _settings(spec))
+    drives = [_drives(mech, spec, drive) for drive in kinds_among(mech.drives) if drive.parameters]
+    tables = (_joints(mech, spec), *drives, _rods(spec), _links(mech, spec), _settings(spec))
     return [table for table in tables if table.rows]
 
 
@@ -39,10 +43,10 @@ def _rods(spec: dict[str, Any]) -> Table:
 def _links(mech: Mechanism, spec: dict[str, Any]) -> Table:
     bodies = [("platform", spec["platform"]), *((f"rod {rod['name']}", rod["body"]) for rod in spec["rods"])]
     for name, leg in zip(mech.leg_names, spec["legs"], strict=True):
-        if leg["slider"] is None:
-            bodies += [(f"{part} {name}", leg[part]) for part in ("cylinder", "piston")]
-        else:
-            bodies += [(f"carriage {name}", leg["slider"]["carriage"]), (f"strut {name}", leg["piston"])]
+        drive = drive_of(leg)
+        bodies += [
+            (f"{link} {name}", body) for link, body in zip(drive.links, drive.bodies(leg), strict=True)
+        ]
     rows = [
         (
             name,
@@ -66,19 +70,27 @@ def _moments(body: dict[str, Any]) -> list[str]:
     return [f"{body['inertia'][i][j]:.4g}" for i, j in entries]
 
 
-def _rails(spec: dict[str, Any]) -> Table:
+def _drives(mech: Mechanism, spec: dict[str, Any], drive: Drive) -> Table:
+    """The parameters of all drives of a kind."""
     rows = [
-        (
-            leg["name"],
-            _vector(leg["slider"]["axis"], digits=4),
-            f"{1e3 * leg['slider']['strut']:.2f}",
-            f"{leg['slider']['branch']:+.0f}",
-        )
-        for leg in spec["legs"]
-        if leg["slider"] is not None
+        (leg["name"], *(_parameter(leg[drive.key][key], kind) for key, kind in drive.parameters.items()))
+        for leg, own in zip(spec["legs"], mech.drives, strict=True)
+        if own == drive
     ]
-    headers = ("leg", "axis", "strut / mm>", "branch>")
-    return Table("Rails, through the base points, and struts", headers, rows)
+    headers = (
+        f"{key} / {SHOWN[kind][1]}>" if kind in SHOWN else key if kind == "direction" else f"{key}>"
+        for key, kind in drive.parameters.items()
+    )
+    return Table(drive.parameters_title, ("leg", *headers), rows)
+
+
+def _parameter(value: Any, kind: str) -> str:
+    match kind:
+        case "direction":
+            return _vector(value, digits=4)
+        case "sign":
+            return f"{value:+.0f}"
+    return f"{SHOWN[kind][0] * value:.2f}"
 
 
 def _settings(spec: dict[str, Any]) -> Table:

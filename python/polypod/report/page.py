@@ -15,7 +15,6 @@ from markdown_it import MarkdownIt
 from markupsafe import Markup
 from plotly.offline import get_plotlyjs
 
-from polypod.files.mechanism_schema import SLIDER_LINKS, TELESCOPE_LINKS
 from polypod.files.text import replacing
 from polypod.mechanism import Mechanism
 from polypod.report import figures, groups
@@ -169,15 +168,15 @@ def _motion(mech: Mechanism, along: Along, series: Series) -> dict[str, Any]:
         "outcomes": tables.outcomes_table(facts),
         "poses": figures.poses_picture(mech, solution),
         "fig4": shown(groups.motion_charts(solution)),
-        "actuators": actuators_table(along.actuators, mech.leg_letters),
+        "actuators": actuators_table(along.actuators, mech),
         "actuator_charts": shown(groups.actuator_charts(mech, solution)),
         "reactions": reactions_table(along.reactions),
         "reaction_charts": shown(groups.reaction_charts(mech, along.reactions)),
         "undetermined": bool(along.reactions.undetermined.any()),
         "singularity_charts": shown(groups.singularity_charts(mech, solution)),
         "legs": [
-            (name, shown(groups.leg_charts(data, i, SLIDER_LINKS if sliding else TELESCOPE_LINKS)))
-            for i, (name, sliding) in enumerate(zip(mech.leg_names, mech.sliders.tolist(), strict=True))
+            (name, shown(groups.leg_charts(data, i, drive.links)))
+            for i, (name, drive) in enumerate(zip(mech.leg_names, mech.drives, strict=True))
         ],
         "source": along.source,
     }

@@ -74,7 +74,8 @@ def _peak(time: Array, values: Array) -> tuple[str, str]:
 def families(found: Reactions) -> list[tuple[str, list[int]]]:
     """Joints that belong together, by index: rods, then base, prismatic and platform joints of all legs."""
     # Each leg has its three joints in this order; rods come before all of them.
-    rods = next(i for i, joint in enumerate(found.joints) if joint.kind == "P") - 1
-    names = ("base joints", "prismatic joints", "platform joints")
+    rods = sum(joint.name.startswith("rod ") for joint in found.joints)
+    driven = dict.fromkeys(joint.name.split()[0] for joint in found.joints[rods + 1 :: 3])
+    names = ("base joints", f"{' and '.join(driven)} joints", "platform joints")
     of_legs = [(name, list(range(rods + k, len(found.joints), 3))) for k, name in enumerate(names)]
     return [("rods", list(range(rods))), *of_legs] if rods else of_legs

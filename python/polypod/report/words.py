@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
-from polypod.answers.leg_words import slides, word
+from polypod.answers import leg_words
 from polypod.files.units import coordinate_unit, readable
+from polypod.legs.drives import kinds_among
+from polypod.mechanism import Mechanism
 from polypod.report.content import Along, Content
-from polypod.summary.tables import Table, fixed, outcome, range_mm, significant
+from polypod.summary.tables import Table, fixed, in_range, outcome, significant
 
 
 def warnings(content: Content) -> list[str]:
@@ -91,35 +92,38 @@ def _of_motion(along: Along) -> list[tuple[str, str]]:
     return found
 
 
-def actuators_table(rows: list[dict[str, Any]], letters: Sequence[str]) -> Table:
-    """Requirements of the motion on each actuator; `letters` are the joints of all legs."""
-    cells = []
+def actuators_table(rows: list[dict[str, Any]], mech: Mechanism) -> Table:
+    """What the motion asks of each actuator."""
+    cells, drives = [], mech.drives
     for row in rows:
+        scale = leg_words.factor(drives[mech.leg_names.index(row["leg"])])
         force, speed, power, stroke = (row[key] for key in ("force", "speed", "power", "stroke"))
         cells.append(
             (
                 row["leg"],
                 fixed(force["peak"]),
                 fixed(force["rms"]),
-                fixed(speed["peak"], 1e3),
-                fixed(speed["rms"], 1e3),
+                fixed(speed["peak"], scale),
+                fixed(speed["rms"], scale),
                 fixed(power["peak"]),
                 fixed(power["rms"]),
-                range_mm([stroke["least"], stroke["greatest"]]) if stroke["used"] is not None else "none",
-                fixed(stroke["used"], 1e3),
+                "none" if stroke["used"] is None else in_range([stroke["least"], stroke["greatest"]], scale),
+                fixed(stroke["used"], scale),
                 "" if stroke["share"] is None else f"{100 * stroke['share']:.1f} %",
             )
         )
+    speed, force = leg_words.unit(drives, "/s"), leg_words.force_unit(drives)
+    place = leg_words.unit(drives)
     headers = (
-        *("leg", "peak force / N>", "rms / N>", "peak speed / mm/s>", "rms / mm/s>", "peak power / W>"),
-        *("rms / W>", f"{word(letters)} / mm>", "stroke used / mm>", "of the stroke>"),
+        *("leg", f"peak force / {force}>", f"rms / {force}>", f"peak speed / {speed}>", f"rms / {speed}>"),
+        *("peak power / W>", "rms / W>", f"{leg_words.word(drives)} / {place}>"),
+        *(f"stroke used / {place}>", "of the stroke>"),
     )
     note = (
         "Peaks are the values of largest size, with their signs: forces are positive when they push the "
         "platform away, speeds when the leg becomes longer, powers when the actuator drives."
     )
-    if any(map(slides, letters)):
-        note += " Of a slider, forces and speeds are positive along its rail's axis."
+    note = " ".join([note, *(drive.signs for drive in kinds_among(drives) if drive.signs)])
     return Table("Actuators", headers, cells, note)
 
 

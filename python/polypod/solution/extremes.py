@@ -39,4 +39,4 @@ def peak(values: Array) -> float | None:
 def stroke_limits(mech: Mechanism, leg: int) -> list[float | None]:
     """Least and greatest length or place of a leg, m; None for no limit, also for a least length of zero."""
     low, high = mech.stroke[leg]
-    return [number(low) if low != 0.0 or mech.sliders[leg] else None, number(high)]
+    return [number(low) if low != mech.drives[leg].least else None, number(high)]

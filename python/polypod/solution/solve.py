@@ -172,7 +172,7 @@ def dataset_of(
         about = variable(name)
         # A mechanism without rods or constraints has no such variables.
         if 0 not in array.shape[1:]:
-            data[name] = (("time", *about.dims), array, attributes_of(name, about, mech.sliders))
+            data[name] = (("time", *about.dims), array, attributes_of(name, about, mech.drives))
     dims = {dim for of, _, _ in data.values() for dim in of}
     instants = {"time": ("time", time, TIME)}
     source = {

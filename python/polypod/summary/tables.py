@@ -7,8 +7,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from polypod.answers.leg_words import word
+from polypod.answers.leg_words import factor, force_unit, unit, word
 from polypod.files.units import coordinate_unit, readable
+from polypod.legs.drive import Drive
+from polypod.legs.drives import drive_of_letters
 
 Facts = dict[str, Any]
 
@@ -52,18 +54,23 @@ def mechanism_tables(facts: Facts) -> list[Table]:
 
 def legs_table(facts: Facts) -> Table:
     """Joints, actuation and strokes."""
+    drives = _drives(facts)
     rows = [
         (
             leg["name"],
             leg["joints"],
             "yes" if leg["actuated"] else "no",
-            fixed(leg["home_length"], 1e3),
-            range_mm(leg["stroke"]),
+            fixed(leg["home_length"], factor(drive)),
+            in_range(leg["stroke"], factor(drive)),
         )
-        for leg in facts["legs"]
+        for leg, drive in zip(facts["legs"], drives, strict=True)
     ]
-    at_home = f"{word(leg['joints'] for leg in facts['legs'])} at home / mm>"
-    return Table("Legs", ("leg", "joints", "actuated", at_home, "stroke / mm>"), rows)
+    at_home, stroke = f"{word(drives)} at home / {unit(drives)}>", f"stroke / {unit(drives)}>"
+    return Table("Legs", ("leg", "joints", "actuated", at_home, stroke), rows)
+
+
+def _drives(facts: Facts) -> list[Drive]:
+    return [drive_of_letters(leg["joints"]) for leg in facts["legs"]]
 
 
 def mobility_table(facts: Facts) -> Table:
@@ -271,18 +278,22 @@ def motion_tables(facts: Facts) -> list[Table]:
 
 def motion_table(facts: Facts) -> Table:
     """Lengths or places, speeds and forces of the legs along a motion."""
+    drives = _drives(facts)
     rows = [
         (
             leg["name"],
-            _length_mm(leg),
-            range_mm(leg["stroke"]),
-            fixed(leg["peak_rate"], 1e3),
+            _passed(leg, factor(drive)),
+            in_range(leg["stroke"], factor(drive)),
+            fixed(leg["peak_rate"], factor(drive)),
             fixed(leg["peak_force"]),
         )
-        for leg in facts["legs"]
+        for leg, drive in zip(facts["legs"], drives, strict=True)
     ]
-    passed = f"{word(leg['joints'] for leg in facts['legs'])} / mm>"
-    return Table("Legs", ("leg", passed, "stroke / mm>", "peak speed / mm/s>", "peak force / N>"), rows)
+    headers = (
+        *("leg", f"{word(drives)} / {unit(drives)}>", f"stroke / {unit(drives)}>"),
+        *(f"peak speed / {unit(drives, '/s')}>", f"peak force / {force_unit(drives)}>"),
+    )
+    return Table("Legs", headers, rows)
 
 
 def peaks_table(facts: Facts) -> Table:
@@ -372,11 +383,11 @@ def coupled_note(facts: Facts) -> str:
     return f"Note: {facts['coupled']['note']}." if facts["coupled"] else ""
 
 
-def _length_mm(leg: Facts) -> str:
+def _passed(leg: Facts, factor: float) -> str:
     """The lengths that a leg passes, marked where they leave its stroke."""
     if leg["length"][0] is None:
         return "none"
-    return range_mm(leg["length"]) + (" outside" if leg["outside_stroke"] else "")
+    return in_range(leg["length"], factor) + (" outside" if leg["outside_stroke"] else "")
 
 
 # --- a workspace --------------------------------------------------------------------------------------------
@@ -412,9 +423,9 @@ def ends_table(facts: Facts) -> Table:
 # --- numbers ------------------------------------------------------------------------------------------------
 
 
-def range_mm(limits: list[float | None]) -> str:
-    """Least and greatest of lengths in m, written in mm."""
-    low, high = (fixed(value, 1e3) for value in limits)
+def in_range(limits: list[float | None], factor: float) -> str:
+    """Least and greatest value, in SI, written in another unit."""
+    low, high = (fixed(value, factor) for value in limits)
     return "free" if limits == [None, None] else f"{low} to {high}"
 
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from polypod.answers.status import Status
 from polypod.multibody.placement import BASE, PLATFORM, Placements
-from polypod.multibody.tree import POINT, Body, Multibody, Y
+from polypod.multibody.tree import POINT, Body, Multibody
 from polypod.vectors import cross, perpendiculars
 from polypod.verify.constraints import Row, Slide, Start
 from polypod.verify.twin import Forced, inertial
@@ -160,10 +160,10 @@ class System:
             return held[t]
 
         for i, leg in enumerate(self.tree.legs):
-            # In the links' axes: along the leg, apart, or along the rail, on the carriage alone.
-            pushed = (
-                ((leg.piston, Y), (leg.cylinder, -Y)) if leg.rail is None else ((leg.slide, leg.rail[1]),)
-            )
+            # In the links' axes: on both, apart, or on the first alone where the base carries the rest.
+            pushed = [(leg.slide, leg.axis)]
+            if not leg.drive.moves_foot:
+                pushed.append((leg.first, -leg.axis))
             for body, way in pushed:
 
                 def push(mbs: Any, t: float, load: Any, i: int = i, way: Array = way) -> list[float]:

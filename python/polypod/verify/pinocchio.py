@@ -327,8 +327,8 @@ class Twin:
         def of(get: Any, frames: list[int], part: slice) -> Array:
             return np.array([get(frame)[part] for frame in frames]).reshape(-1, 3)
 
-        pistons = [tree.centers[leg.piston] for leg in parts]
-        cylinders = [tree.centers[leg.cylinder] for leg in parts]
+        pistons = [tree.centers[leg.second] for leg in parts]
+        cylinders = [tree.centers[leg.first] for leg in parts]
         rods = [tree.frames[rod] for rod in tree.tree.rods]
         point, turn = slice(0, 3), slice(3, 6)
         return {

@@ -52,8 +52,8 @@ class Forced(ABC):
         moved = self.accelerations(start, twist, wrench, forces)
         if isinstance(moved, Status):
             return found, moved
-        cylinders = [self.numbers[leg.cylinder] for leg in self.tree.legs]
-        pistons = [self.numbers[leg.piston] for leg in self.tree.legs]
+        cylinders = [self.numbers[leg.first] for leg in self.tree.legs]
+        pistons = [self.numbers[leg.second] for leg in self.tree.legs]
         platform = moved[self.numbers[PLATFORM]]
         found |= {
             "platform_acceleration": platform[:3],
@@ -74,7 +74,7 @@ def inertial(tree: Multibody, body: Body) -> tuple[float, Array]:
     """
     if body.mass == 0.0:
         mass, inertia = light(tree)
-        if any(leg.spins and body.name in (leg.cylinder, leg.piston) for leg in tree.legs):
+        if any(leg.spins and body.name in (leg.first, leg.second) for leg in tree.legs):
             inertia[1, 1] = mass / LIGHT * tree.scale**2
         return mass, inertia
     share = 1.0 / tree.geometry["efficiency"] if body.name == PLATFORM else 1.0

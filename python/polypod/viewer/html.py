@@ -8,7 +8,7 @@ from typing import Any
 
 from jinja2 import Environment, PackageLoader
 
-from polypod.answers.leg_words import word
+from polypod.answers.leg_words import factor, force_unit, unit, word
 from polypod.bodies.palette import GREY, color_of
 from polypod.files.units import coordinate_unit
 from polypod.mechanism import Mechanism
@@ -66,7 +66,8 @@ def numbers(
         view=view,
         place=[_cell(name, value) for name, value in place.items()],
         legs=[_leg(view, mech, i) for i in range(mech.n_legs)],
-        what=word(mech.leg_letters),
+        what=f"{word(mech.drives)} / {unit(mech.drives)}",
+        force=force_unit(mech.drives),
         screw=_screw(view.screw),
         ranges=[_range(name, *pair) for name, pair in ranges.items()],
         largest=f"{largest:.0f} N" if largest >= 10.0 else f"{largest:.3g} N" if largest > 0.0 else "",
@@ -95,7 +96,7 @@ def _leg(view: View, mech: Mechanism, leg: int) -> dict[str, Any]:
         "color": color_of(leg),
         "at": 100.0 * min(max(part, 0.0), 1.0) if bounded else None,
         "shade": GREY if level is Level.FINE else LEVEL_COLORS[level],
-        "length": 1e3 * length,
+        "length": factor(mech.drives[leg]) * length,
         "force": _fixed(force) if mech.actuated[leg] else "passive",
     }
 

@@ -10,14 +10,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from polypod.answers.leg_words import word
+from polypod.answers.leg_words import readable_coordinate
 from polypod.answers.singularity import NEAR_SINGULAR, TOLERANCE, SingularityKind
 from polypod.answers.status import Status
 from polypod.bodies.links import LinkPlaces, links_of
 from polypod.errors import PolypodError, UnknownNameError
-from polypod.files.units import KIND_OF_COORDINATE, coordinate_unit, readable
+from polypod.files.units import KIND_OF_COORDINATE, coordinate_unit, readable, si_unit
 from polypod.mechanism import Mechanism, spans
-from polypod.vectors import unit
 from polypod.viewer.player import Track
 
 Array = NDArray[np.float64]
@@ -74,7 +73,7 @@ class View:
     lengths: Array
     """(n,), m."""
     joints: Array
-    """(n, 3): where the active forces are drawn, m: at the platform joints b, of sliders at the carriages."""
+    """(n, 3): where active forces are drawn, m: at platform joints b, or at base joints that are moved."""
     directions: Array
     """(n, 3)."""
     slack: Array
@@ -128,7 +127,6 @@ class Model:
         self._legs = self.mech.geometry["legs"]
         self._limits = self.mech.limit_list
         self._base = np.array([leg["base"]["point"] for leg in self._legs])
-        self._rails = np.array([unit((leg["slider"] or {"axis": [1, 0, 0]})["axis"]) for leg in self._legs])
         self._names = {**self.mech.coordinate_sets, "pose": self._independent()}
         self._home_lengths = self.mech.inverse_kinematics(self.mech.home).lengths
         self._row: int | None = None
@@ -176,7 +174,7 @@ class Model:
             home, half = float(self._home_lengths[leg]), 0.5 * float(spans(self.mech)[leg])
             return home - half, home + half
         beyond = 0.1 * (high - low)
-        return low - beyond if self.mech.sliders[leg] else max(low - beyond, 0.0), high + beyond
+        return max(low - beyond, self.mech.drives[leg].least), high + beyond
 
     # --- moving --------------------------------------------------------------------------------------------
 
@@ -206,19 +204,22 @@ class Model:
     def set_length(self, leg: int, value: float) -> bool:
         """Moves one leg, the others kept, in the present assembly mode; whether there is such a pose."""
         name = self.mech.leg_names[leg]
-        what, sliding = word([self.mech.leg_letters[leg]]), bool(self.mech.sliders[leg])
+        drive = self.mech.drives[leg]
+        what = drive.coordinate
         if not self.mech.actuated[leg]:
             return self._refuse(f"Leg {name} is passive: its {what} follows from the others.")
-        if not np.isfinite(value) or (value <= 0.0 and not sliding):
-            return self._refuse(f"The {what} of leg {name} cannot be {value} m.")
+        if not np.isfinite(value) or value <= drive.least:
+            return self._refuse(
+                f"The {what} of leg {name} cannot be {value} {si_unit(drive.coordinate_kind)}."
+            )
         lengths = self.mech.inverse_kinematics(self.pose).lengths.copy()
         lengths[leg] = value
         found = self.mech.forward_kinematics(lengths, self.pose)
         status = Status(int(found.status))
         if not status.has_answer or status is Status.MODE_JUMP:
             return self._refuse(
-                f"The {what} of leg {name} cannot be {readable(value, 'm')} while the others keep theirs: "
-                f"{status.message}."
+                f"The {what} of leg {name} cannot be {readable_coordinate(drive, value)} while the others "
+                f"keep theirs: {status.message}."
             )
         return self._move(found.pose)
 
@@ -265,18 +266,21 @@ class Model:
         kind = SingularityKind(int(near.kind))
         loose = kind in (SingularityKind.ACTUATION, SingularityKind.CONSTRAINT)
         loose |= kind is SingularityKind.CONSTRAINT_VANISHES
-        frames, sliding = self._places.at(pose).frames, mech.sliders[:, None]
+        frames, moved = self._places.at(pose).frames, mech.moves_feet
         # The first link of each leg is at its base joint.
         first = 1 + len(mech.rod_names)
-        carriages = frames[first : first + 2 * mech.n_legs : 2, :3, 3]
+        feet = frames[first : first + 2 * mech.n_legs : 2, :3, 3]
+        directions = legs.directions.copy()
+        for i in np.flatnonzero(moved):
+            directions[i] = mech.drives[i].push(self._legs[i], feet[i])
         known = bool(np.isfinite(near.axis).all() and np.isfinite(near.point).all())
         screw = Screw(near.point, near.axis, float(near.pitch), near.twist[:3]) if loose and known else None
         return View(
             pose=pose,
             frames=frames,
             lengths=legs.lengths,
-            joints=np.where(sliding, carriages, self._base + legs.vectors),
-            directions=np.where(sliding, self._rails, legs.directions),
+            joints=np.where(moved[:, None], feet, self._base + legs.vectors),
+            directions=directions,
             slack=self._slack(limits.relative),
             forces=dynamics.forces,
             wrench=reactions.constraint_wrench,

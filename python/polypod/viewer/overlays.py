@@ -44,7 +44,7 @@ class Overlays:
     def __init__(self, server: viser.ViserServer, model: Model, arrows: Arrows, inbox: Inbox) -> None:
         self._server, self._model, self._arrows, self._inbox = server, model, arrows, inbox
         self._places = LinkPlaces(model.mech)
-        self._of = leg_words.words(model.mech.leg_letters)
+        self._of = leg_words.words(model.mech.drives)
         self._busy = threading.Lock()
         self._workspace: Any = None
         self._modes: list[Any] = []

@@ -77,7 +77,7 @@ class Panel:
         self.tabs = gui.add_tab_group()
         with self.tabs.add_tab("Coordinates"):
             self._add_coordinates()
-        with self.tabs.add_tab(leg_words.words(model.mech.leg_letters).capitalize()):
+        with self.tabs.add_tab(leg_words.words(model.mech.drives).capitalize()):
             self._lengths = [self._length_slider(i) for i in range(model.mech.n_legs)]
         if player is not None:
             with self.tabs.add_tab("Motion"):
@@ -131,19 +131,20 @@ class Panel:
 
     def _length_slider(self, leg: int) -> _Slider:
         model = self._model
-        low, high = (round(1e3 * end, 1) for end in model.length_range(leg))
-        now = 1e3 * float(model.mech.inverse_kinematics(model.pose).lengths[leg])
+        drive = model.mech.drives[leg]
+        factor = leg_words.factor(drive)
+        low, high = (round(factor * end, 1) for end in model.length_range(leg))
+        now = factor * float(model.mech.inverse_kinematics(model.pose).lengths[leg])
         start = min(max(round(now, 1), low), high)
         active = bool(model.mech.actuated[leg])
-        label = f"{model.mech.leg_names[leg]} / mm"
-        what = leg_words.word([model.mech.leg_letters[leg]])
-        hint = None if active else f"A passive leg: its {what} follows from the others."
+        label = f"{model.mech.leg_names[leg]} / {leg_words.unit([drive])}"
+        hint = None if active else f"A passive leg: its {drive.coordinate} follows from the others."
         handle = self._gui.add_slider(label, low, high, _STEP, start, disabled=not active, hint=hint)
-        slider = _Slider(handle, ("length", leg), 1e3, _STEP)
+        slider = _Slider(handle, ("length", leg), factor, _STEP)
 
         def move(value: float) -> None:
             self._stop()
-            model.set_length(leg, value / 1e3)
+            model.set_length(leg, value / factor)
 
         listen(handle, self._inbox, slider.key, move)
         return slider

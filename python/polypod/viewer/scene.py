@@ -10,9 +10,11 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from polypod.answers.singularity import NEAR_SINGULAR
-from polypod.bodies.links import PLATFORM, STEEL, Link, leg_radii
+from polypod.bodies.drives import DRAWINGS
+from polypod.bodies.links import Link, leg_radii
 from polypod.bodies.palette import SKY, YELLOW, Rgb, rgb
-from polypod.bodies.rails import way
+from polypod.bodies.pieces import PLATFORM, STEEL
+from polypod.legs.drives import LINK_PLACE
 from polypod.mechanism import Mechanism
 from polypod.viewer.model import Level, Model, View
 from polypod.workspaces.workspace import Workspace
@@ -77,7 +79,7 @@ class Machine:
                     smooth.faces,
                     color=rgb(piece.color),
                 )
-                if link.kind in ("cylinder", "piston", "strut") and piece.color == STEEL:
+                if link.kind in LINK_PLACE and piece.color == STEEL:
                     self._legs[link.index].append(node)
                 elif piece.color == PLATFORM:
                     self._platform.append(node)
@@ -229,7 +231,8 @@ def add_labels(api: viser.SceneApi, mech: Mechanism) -> list[viser.LabelHandle]:
     labels = []
     home = mech.inverse_kinematics(mech.home).lengths
     for i, leg in enumerate(mech.geometry["legs"]):
-        point = np.array(leg["base"]["point"]) if leg["slider"] is None else way(leg, float(home[i]))[0]
+        way = DRAWINGS[mech.drives[i]].way(leg, float(home[i]))
+        point = np.array(leg["base"]["point"]) if way is None else way[0]
         at = point * (1.0 + 0.25 * size / max(float(np.linalg.norm(point)), size))
         labels.append(api.add_label(f"/labels/{i}", mech.leg_names[i], position=tuple(at)))
     return labels

@@ -14,6 +14,7 @@ from polypod import _core
 from polypod.answers.notebook import card, rows_of
 from polypod.errors import UnsupportedError, WorkspaceError
 from polypod.files.units import readable
+from polypod.legs.drives import TELESCOPE, kinds_among
 from polypod.mechanism import Mechanism
 from polypod.workspaces.search_region import Progress, bounds_of, check_threads, start_of
 from polypod.workspaces.workspace import with_floor
@@ -148,10 +149,16 @@ def length_lattice(
     """
     mech = with_floor(mech, sigma_min)
     check_threads(threads)
-    driven = mech.sliders & mech.actuated
-    if driven.any():
-        sliding = ", ".join(np.array(mech.leg_names)[driven])
-        raise UnsupportedError(f"legs {sliding} are sliders; a lattice of lengths is of telescopic legs")
+    others = kinds_among(
+        drive for drive, actuated in zip(mech.drives, mech.actuated, strict=True) if actuated
+    )
+    for kind in others:
+        if kind != TELESCOPE:
+            legs = zip(mech.leg_names, mech.drives, mech.actuated, strict=True)
+            names = ", ".join(name for name, drive, actuated in legs if drive == kind and actuated)
+            raise UnsupportedError(
+                f"legs {names} are {kind.name}s; a lattice of lengths is of {TELESCOPE.name}s"
+            )
     strokes = mech.stroke[mech.actuated]
     widths = np.ptp(strokes, axis=1)
     for name, (least, greatest) in zip(np.array(mech.leg_names)[mech.actuated], strokes, strict=True):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -72,36 +72,24 @@ def position_bounds(mech: Mechanism) -> Array:
     """
     legs = mech.geometry["legs"]
     reach = np.linalg.norm([leg["platform"]["point"] for leg in legs], axis=1)
-    struts = [leg["slider"]["strut"] if leg["slider"] else np.nan for leg in legs]
-    reach += np.where(mech.sliders, struts, mech.stroke[:, 1])
+    strokes = [*zip(legs, mech.drives, mech.stroke, strict=True)]
+    reach += [drive.longest(leg, stroke) for leg, drive, stroke in strokes]
     # The base joint can be at any point between two.
-    ends = np.array([_ways(leg, stroke) for leg, stroke in zip(legs, mech.stroke, strict=True)])
+    ends = np.array([drive.feet(leg, stroke) for leg, drive, stroke in strokes])
     low, high = ends.min(axis=1) - reach[:, None], ends.max(axis=1) + reach[:, None]
     box = np.stack([low.max(axis=0), high.min(axis=0)], axis=1)
-    base = ends.reshape(-1, 3) if mech.sliders.any() else ends[:, 0]
+    base = ends.reshape(-1, 3) if mech.moves_feet.any() else ends[:, 0]
     if not np.isfinite(base).all():
         return box
     middle = base.mean(axis=0)
     _, sizes, axes = np.linalg.svd(base - middle)
-    if mech.sliders.any() and sizes[2] > _FLAT * sizes[1]:
+    if mech.moves_feet.any() and sizes[2] > _FLAT * sizes[1]:
         return box
     normal = axes[2]
     axis = int(np.argmax(np.abs(normal)))
     home = mech.home[axis, 3]
     box[axis, 0 if home >= middle[axis] else 1] = middle[axis]
     return box
-
-
-def _ways(leg: Mapping[str, Any], stroke: Array) -> Array:
-    """(2, 3): between which points the base joint of a leg can be, m."""
-    point = np.array(leg["base"]["point"])
-    if leg["slider"] is None:
-        return np.stack([point, point])
-    axis = np.array(leg["slider"]["axis"]) / np.linalg.norm(leg["slider"]["axis"])
-    if not np.isfinite(stroke).all():
-        # Anywhere along the axes that the rail is not perpendicular to.
-        return np.array([np.where(axis == 0.0, point, -np.inf), np.where(axis == 0.0, point, np.inf)])
-    return np.asarray(point + np.outer(stroke, axis))
 
 
 def bounds_of(

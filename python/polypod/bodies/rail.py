@@ -1,24 +1,22 @@
-"""Rails, carriages and struts of sliders as solid pieces: what `polypod.bodies.links` draws of such legs.
+"""Rails on the base, along which joints move, as solid pieces, and how they lie.
 
-The rail stands behind the line of the joints, so that the carriage is between rail and joint.
+A rail stands behind the line of the joints, so that the carriage is between rail and joint.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from trimesh import Trimesh
 
 from polypod.bodies.solids import beam, tube
-from polypod.vectors import perpendiculars, unit
+from polypod.vectors import perpendiculars
 
 Array = NDArray[np.float64]
 
-NOMINAL_WAY = 0.6
-"""How far a rail is drawn to each side of home where the file gives no stroke, by the length of the strut."""
 FLAT = 0.05
 """Rails lie on a plate if their ends leave its plane by less than this part of their width."""
 GAP, SHOE, OVERHANG = 2.9, 2.4, 2.0
@@ -55,15 +53,6 @@ class Rail(NamedTuple):
         """From the block to the joint."""
         top = (GAP - 0.4 * SHOE) * self.radius * self.back
         return tube(top, np.zeros(3), 0.95 * self.radius, end_radius=0.75 * self.radius)
-
-
-def way(leg: Mapping[str, Any], home: float) -> Array:
-    """(2, 3): the ends of a carriage's way, base axes, m; `home` is its place at the centre pose."""
-    axis, stroke = unit(leg["slider"]["axis"]), leg["stroke"]
-    if stroke is None:
-        half = NOMINAL_WAY * leg["slider"]["strut"]
-        stroke = (home - half, home + half)
-    return np.asarray(leg["base"]["point"] + np.outer(stroke, axis))
 
 
 def flat_normal(points: Array) -> Array | None:
