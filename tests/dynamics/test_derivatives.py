@@ -427,7 +427,7 @@ def described(spec, tied):
 
     tables = {k: spec[k] for k in ("name", "load", "tool", "platform")}
     tables["dynamics"] = {k: spec[k] for k in ("gravity", "efficiency", "linear_damping", "angular_damping")}
-    tables["units"] = {kind: next(iter(names)) for kind, names in o._UNITS.items()}  # SI
+    tables["units"] = {kind: next(iter(names)) for kind, names in o.UNITS.items()}  # SI
     tables["home"] = {"position": center, "rotation_vector": turned}
     tables["rods"] = [{k: r[k] for k in ("name", "point", "axis")} | (r["body"] or {}) for r in spec["rods"]]
     tables["legs"] = [

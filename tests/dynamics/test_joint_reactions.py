@@ -47,7 +47,7 @@ def twin_tables(name):
     kinds = REDUNDANT[name]
     tables = draw(name, kinds, np.random.default_rng([SEED, *name.encode()]))
     spec, legs = o.read(tables), tables["legs"]
-    per = 1 / o._UNITS["length"][tables["units"]["length"]]
+    per = 1 / o.UNITS["length"][tables["units"]["length"]]
     for i, kind in enumerate(kinds):
         like = next(k for k, other in enumerate(kinds) if other.strip("-") == kind.strip("-"))
         if not kind.endswith("-") or like == i:

@@ -91,7 +91,7 @@ def test_rust_files_of_one_room_may_not_import_one_another_in_a_circle(tmp_path)
         "from ..mechanism import Mechanism\n",
         "import polypod.mechanism\n",
         "def later():\n    from polypod.mechanism import Mechanism\n",
-        "from typing import TYPE_CHECKING\n\nif TYPE_CHECKING:\n    from polypod.mechanism import Mechanism\n",
+        "import typing\n\nif typing.TYPE_CHECKING:\n    from polypod.mechanism import Mechanism\n",
     ],
 )
 def test_python_files_may_not_import_one_another_in_a_circle(tmp_path, text):
