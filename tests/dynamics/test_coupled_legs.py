@@ -64,7 +64,7 @@ def test_coupled_forces_fall_out_of_massless_legs(name):
 
 @pytest.mark.parametrize("name", ["lu", "rod-lined"])
 def test_with_mass_they_are_what_legs_carry_and_the_coupled_forces(name):
-    """What the legs' own mass does at b, carried there as in [T14], is the whole difference."""
+    """The effect of the legs' own mass at b, carried there as in [T14], is the whole difference."""
     c = any_case(name)
     answer, dynamics = reactions(c), c.mech.inverse_dynamics(c.T, c.twist, c.acceleration)
     coupled = c.mech.coupled_forces(c.T, dynamics.constraint)

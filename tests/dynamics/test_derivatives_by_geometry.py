@@ -47,7 +47,7 @@ def settled(spec, lined):
     """The description with what its free numbers decide.
 
     Joints on a rod stay on it, and where the legs on it have their platform axes on one line they stay on
-    that; both axes of an F joint turn as one.
+    that; both axes of an F joint rotation as one.
     """
     joints = [leg[side] for leg in spec["legs"] for side in ("base", "platform")]
     for j in (j for j in joints if j["joint"] == "F"):

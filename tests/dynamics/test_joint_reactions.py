@@ -109,7 +109,7 @@ def given_wrenches(c: Case, wrench=None, axes="base") -> dict:
 
 
 def left_over(c: Case, joints, found, given):
-    """What is left of the balance of each link, (links, N, 6), forces and torques about its mass centre."""
+    """Residual of the balance of each link, (links, N, 6), forces and torques about its mass centre."""
     rest = {name: w.copy() for name, (w, _) in given.items()}
     for k, joint in enumerate(joints):
         for link, sign in ((joint.outer, 1), (joint.inner, -1)):
@@ -121,7 +121,7 @@ def left_over(c: Case, joints, found, given):
 
 
 # ------------------------------------------------------------------------------------------------------------
-# Balance, freedoms, active forces
+# Balance, degrees of freedom, active forces
 # ------------------------------------------------------------------------------------------------------------
 
 
@@ -162,7 +162,7 @@ def test_joints_stand_where_they_are_and_carry_nothing_that_they_leave_free(name
 
 @each
 def test_joint_axes_are_those_of_the_joints(name):
-    """Orthonormal, right-handed; free turns about the first axes; δ second in a prismatic joint."""
+    """Orthonormal, right-handed; free rotations about the first axes; δ second in a prismatic joint."""
     c = any_case(name)
     answer, joints = reactions(c), joints_of(c)
     axes = answer.axes
@@ -206,7 +206,7 @@ def test_prismatic_joints_carry_the_active_forces(name):
 
 
 def system(c: Case, k: int):
-    """The balances of all links and the freedoms of all joints at state k, for all reactions (F, T/Λ).
+    """Balances of all links and degrees of freedom of all joints at state k, for all reactions (F, T/Λ).
 
     Matrix and right-hand side; pure numbers and N.
     """
@@ -363,7 +363,7 @@ def test_a_leg_along_its_axis_has_no_answer():
 
 
 def test_a_design_that_is_singular_everywhere_has_no_answer():
-    """Similar hexagons with S joints below: the platform keeps a freedom that no actuator holds."""
+    """Similar hexagons with S joints below: the platform keeps a degree of freedom that no actuator holds."""
     data = pp.load(DATA / "stewart-gough.toml").to_dict()
     for leg, angle in zip(data["legs"], (10, 50, 130, 170, 250, 290), strict=True):
         leg["base"] = {"joint": "S", "point": {"radius": 500.0, "angle": angle}}

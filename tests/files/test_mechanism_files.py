@@ -13,7 +13,7 @@ import tomli_w
 
 import polypod as pp
 from polypod.errors import MechanismError, UnknownNameError
-from polypod.units import from_si, to_si
+from polypod.files.units import from_si, to_si
 from support.mechanism_files import BUILT_IN, DELETED, FILES, GOUGH, MIDDLE, PAPER, RPS, TABLES, UP, changed
 
 UNIT_ROUNDING = 1e-15  # m, of points about 1 m away: a few roundings, of sine and cosine and of the unit
@@ -95,11 +95,12 @@ BAD: dict[str, tuple[str, dict[str, Any], str, str]] = {
     ),
     "no direction of a rod": (PAPER, {"rods__1__axis": [0, 0, 0]}, "rods.1.axis", "is zero"),
     "no direction of the tool": (PAPER, {"tool__axis": [0, 0, 0]}, "tool.axis", "is zero"),
-    "R joint not square to its leg": (
+    "R joint not perpendicular to its leg": (
         RPS,
         {"legs__1__base__axis": [1, 1, 0]},
         "legs.1.base.axis",
-        "makes 97.9712 degrees with the leg at the home pose; the axis of an R joint must be square to it",
+        "makes 97.9712 degrees with the leg at the home pose; the axis of an R joint must be perpendicular "
+        "to it",
     ),
     "U joint's axis along its leg": (
         GOUGH,
@@ -113,11 +114,11 @@ BAD: dict[str, tuple[str, dict[str, Any], str, str]] = {
         "legs.1.platform.axis",
         "makes 19.3825 degrees with the leg at the home pose; the axis of an F joint must point along it",
     ),
-    "F joint's normal not square to its axis": (
+    "F joint's normal not perpendicular to its axis": (
         GOUGH,
         {"legs__1__base": UP | {"joint": "F", "normal": [1, 0, 1]}, "legs__1__platform__point": MIDDLE},
         "legs.1.base.normal",
-        "must be square to the axis",
+        "must be perpendicular to the axis",
     ),
     "UPU leg's axes out of plane": (
         GOUGH,
@@ -129,7 +130,7 @@ BAD: dict[str, tuple[str, dict[str, Any], str, str]] = {
         RPS,
         {"legs__1__platform": SQUARE},
         "home",
-        "its axis in the base must be square to its axis in the platform",
+        "its axis in the base must be perpendicular to its axis in the platform",
     ),
     "a leg off its rod": (
         PAPER,
@@ -147,7 +148,7 @@ BAD: dict[str, tuple[str, dict[str, Any], str, str]] = {
         PAPER,
         {"legs__5__actuated": False},
         "legs",
-        "4 actuated legs for 5 freedoms; at least 5",
+        "4 actuated legs for 5 degrees of freedom; at least 5",
     ),
     "not a number": (PAPER, {"legs__4__piston__mass": math.nan}, "legs.4.piston.mass", "is NaN"),
     "not a number in a point": (
@@ -389,7 +390,7 @@ def test_units_of_the_file_do_not_matter(name: str, units: dict[str, str]) -> No
 
 def test_paper_mechanism() -> None:
     mech = pp.load(BUILT_IN)
-    assert repr(mech) == f"<Mechanism {BUILT_IN}: RPU+SPU+RPU+SPU+SPU, 5 freedoms>"
+    assert repr(mech) == f"<Mechanism {BUILT_IN}: RPU+SPU+RPU+SPU+SPU, 5 degrees of freedom>"
     assert (mech.n_legs, mech.leg_names, mech.rod_names) == (5, tuple("12345"), ("L",))
     assert mech.actuated.tolist() == [True] * 5
     assert mech.stroke.tolist() == [[0.65, 0.85]] * 5

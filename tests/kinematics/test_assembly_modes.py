@@ -31,7 +31,7 @@ from support.assembly import (
 
 
 def equations(mech: pp.Mechanism, lengths: Array, pose: tuple[Array, Array]) -> tuple[Array, Array]:
-    """What lengths and joints demand of poses (N, 3, 3) and (N, 3), real or complex; and its rows by (v, ω).
+    """Residuals of lengths and joints at poses (N, 3, 3) and (N, 3), real or complex; and rows by (v, ω).
 
     r·r = ℓ² for actuated legs; for a leg on a rod: r, the rod's line and the platform's axis in one plane;
     for an R joint: r at right angles to its axis.

@@ -84,7 +84,7 @@ def test_pose_of_natural_coordinates() -> None:
 
 
 def turn(axis: int, angle: Array | float) -> Array:
-    """(..., 3, 3): the turn about a coordinate axis."""
+    """(..., 3, 3): the rotation about a coordinate axis."""
     c, s, i, j = np.cos(angle), np.sin(angle), (axis + 1) % 3, (axis + 2) % 3
     R = np.zeros((*np.shape(angle), 3, 3))
     R[..., axis, axis], R[..., i, i], R[..., j, j], R[..., i, j], R[..., j, i] = 1, c, c, -s, s
@@ -345,7 +345,7 @@ def test_continued_follows_a_motion(set: str, dependent: str) -> None:
 
 
 def test_continued_says_when_a_motion_passes_a_fold() -> None:
-    """The turn about the tool has two solutions; on the way they meet, and the motion takes the other."""
+    """The rotation about the tool has two solutions; on the way they meet, and the motion takes the other."""
     poses = loop(1.0)
     state = LU.state(given(LU, poses, "tool"), continued=True)
     jump = int(np.argmax(state.status != Status.OK))

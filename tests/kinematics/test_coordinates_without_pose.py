@@ -50,7 +50,7 @@ def test_natural_coordinates_pass_the_fold() -> None:
 
 
 def test_a_tool_pose_that_cannot_be() -> None:
-    """With the tool along L, l turns in the plane square to L, and o must be e sin θ_1 or more from L."""
+    """With the tool along L, l rotates in the plane across L, and o must be e sin θ_1 or more from L."""
     for distance, expected in ((0.5 * E_S, Status.NOT_CONVERGED), (0.999 * E_S, Status.NOT_CONVERGED),
                                (1.001 * E_S, Status.OK), (0.5, Status.OK)):  # fmt: skip
         q = dict(zip(LU.coordinate_sets["tool"], (0.3, E1_S, distance, 1, 0, 0), strict=True))

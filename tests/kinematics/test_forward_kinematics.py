@@ -113,7 +113,7 @@ def test_the_guess_chooses_the_mode(mech: pp.Mechanism):
 
 
 def test_lengths_of_passive_legs_are_not_read():
-    """A tripod around a middle leg without actuator; with it the platform has three freedoms."""
+    """A tripod around a middle leg without actuator; with it the platform has three degrees of freedom."""
     text = (ROOT / "docs/mechanism-file.md").read_text(encoding="utf-8")
     tripod = pp.Mechanism.from_toml(text.split('```toml title="tripod.toml"')[1].split("```")[0])
     pose = tripod.pose({"x": 0.05, "y": 0.02, "z": 0.62})

@@ -191,7 +191,7 @@ def test_clearance_of_struts_by_search(shape: Callable[[], Tables]):
         (str(i + 1), str(j + 1)) for i, j in pairs
     ]
     shared = 0
-    # Far turned poses too, where struts cross.
+    # Far rotated poses too, where struts cross.
     turned = mech.pose({"x": 0.0, "y": 0.0, "z": 0.55, "rx": 0.3, "ry": 0.1, "rz": np.linspace(-2.8, 2.8, 9)})
     struck = False
     for pose in (*poses(mech, 5), *turned):
@@ -371,7 +371,7 @@ def test_bounds_are_those_of_the_file():
 
 
 def test_the_circle_has_no_ends():
-    """Ranges that differ by whole turns are the same."""
+    """Ranges that differ by whole rotations are the same."""
     mechs = []
     for shift in (-360.0, 0.0, 360.0):
         content = tables("3-rps")
@@ -439,7 +439,7 @@ def test_a_short_strut_is_cut_by_half_at_most():
 
 
 def test_margins_are_continuous():
-    """Where struts cross, joints turn far and the platform is pierced, jumps shrink with the step."""
+    """Where struts cross, joints rotate far and the platform is pierced, jumps shrink with the step."""
     content = six_three() | {"limits": {"clearance": 6.0, "sigma_min": 0.02}}
     for leg in content["legs"]:
         leg["base"]["cone"] = {"angle": 20.0}

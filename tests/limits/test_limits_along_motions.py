@@ -11,13 +11,13 @@ import pytest
 
 import polypod as pp
 from polypod import Status
-from polypod.summary import summarise
+from polypod.summary.solution_facts import summarise
 from support.limited import free, paper
 
 
 @pytest.fixture(scope="module")
 def limited() -> tuple[pp.Mechanism, pp.Motion]:
-    """The published example, with a force that it exceeds and a rod that turns too far."""
+    """The published example, with a force that it exceeds and a rod that rotates too far."""
     content = paper()
     content["legs"][3]["force"] = {"min": -25000.0, "max": 25000.0}
     content["rods"][0]["range"] = {"min": -20.0, "max": 20.0}

@@ -17,7 +17,7 @@ BAD: dict[str, tuple[Callable[[Tables], Any], str, str]] = {
         "legs.1.base.range",
         "needs min < max, at most a full turn apart",
     ),
-    "range of more than a turn": (
+    "range of more than a rotation": (
         lambda t: t["legs"][0]["base"].update(range={"min": -200.0, "max": 200.0}),
         "legs.1.base.range",
         "at most a full turn apart",

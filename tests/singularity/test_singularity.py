@@ -102,7 +102,7 @@ def test_measures_do_not_depend_on_the_size_of_the_machine(name):
 
 
 def assert_uncontrolled(mech: pp.Mechanism, name: str | None, pose: np.ndarray, found) -> None:
-    """The twist changes no leg's length and breaks no constraint, and turns about the given axis."""
+    """The twist changes no leg's length and breaks no constraint, and rotations about the given axis."""
     twist = found.twist
     J = mech.jacobian(pose)
     assert J @ twist == pytest.approx(np.zeros(6), abs=1e-9)

@@ -10,13 +10,13 @@ import pytest
 
 import polypod as pp
 from polypod import Motion
-from polypod.passages import find_passages, warnings_of
+from polypod.solution.singularity_crossings import find_passages, warnings_of
 from support import DATA
 from support.singular import GOUGH, LU, QUARTER, RPS, hexapod
 
 
 def yaw(curve, n: int) -> Motion:
-    """The hexapod turned about z by a function of time in [0, 1]."""
+    """The hexapod rotated about z by a function of time in [0, 1]."""
     fine = np.linspace(0.0, 1.0, 201)
     q = {name: np.full(201, value) for name, value in QUARTER.items()} | {"rz": curve(fine)}
     return Motion.through(fine, q, set="pose").sample(np.linspace(0.0, 1.0, n))

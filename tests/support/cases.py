@@ -76,7 +76,7 @@ def draw_body(rng, symmetric):
 
 
 def across(rng, *vectors):
-    """A unit vector square to the given ones, drawn at random where there is a choice."""
+    """A unit vector perpendicular to the given ones, drawn at random where there is a choice."""
     v = np.cross(*vectors) if len(vectors) == 2 else np.cross(vectors[0], rng.normal(size=3))
     return v / np.linalg.norm(v)
 
@@ -352,7 +352,7 @@ def lu_coordinates():
 
 
 def lu_limits(starts):
-    """The same with h so that the shortest leg is at 650 mm or the longest at 850 mm, or close by."""
+    """Coordinates with h such that the shortest leg is at about 650 mm or the longest at about 850 mm."""
     spec = o.read(o.lu())
     q, upper = np.repeat(starts, 2, axis=0), np.tile([False, True], len(starts))
 
@@ -454,7 +454,7 @@ def motion_coordinates(name, n=6):
 
 
 def at_time(q, q1, q2, t):
-    """The same at time t of a motion with constant second rates."""
+    """Coordinates with rates at time t of a motion with constant second rates."""
     return {k: q[k] + q1[k] * t + q2[k] * t * t / 2 for k in q}, {k: q1[k] + q2[k] * t for k in q}, q2
 
 

@@ -75,7 +75,7 @@ def scale_of(c: Case, found):
 
 
 def light(name) -> Case:
-    """The same states with legs and rods that have no mass."""
+    """The states with legs and rods that have no mass."""
     c = any_case(name)
     tables = c.mech.to_dict()
     for rod in tables["rods"]:

@@ -61,7 +61,8 @@ def leg_at(spec, leg, pose) -> Leg:
         w, eps = np.cross(delta.x, delta.d), np.cross(delta.x, delta.dd)
         n = Jet(n0, np.cross(w, n0), np.cross(eps, n0) + np.cross(w, np.cross(w, n0)))
     else:
-        # Where the joints hold, N is square to δ already; taking off the rest makes E a frame at any pose.
+        # Where the joints hold, N is perpendicular to δ already; taking off the rest makes E a frame at any
+        # pose.
         n = unit(N - dot(N, delta) * delta)
     frame = columns(n, delta, cross(n, delta))
     return Leg(e, b, r, norm(r), delta, n, frame, base_axis, platform_axis)
@@ -72,7 +73,7 @@ def legs_at(spec, pose) -> list[Leg]:
 
 
 def rod_frame(spec, k, legs) -> Jet:
-    """The frame (L, n, L×n) of rod k, which turns with the first leg that it carries."""
+    """The frame (L, n, L×n) of rod k, which rotates with the first leg that it carries."""
     first = next(i for i, leg in enumerate(spec["legs"]) if leg["base"]["rod"] == k)
     L = spec["rods"][k]["axis"]
     n = unit(cross(L, legs[first].delta))
@@ -110,12 +111,12 @@ def links_at(spec, pose) -> list[Link]:
 
 
 def residuals(spec, pose) -> Jet:
-    """What the joints hold together, side by side (..., k); zero where the mechanism closes.
+    """Closure residuals of the joints, side by side (..., k); zero where the mechanism closes.
 
-    In the leg's frame (n, δ, w): a universal joint's two axes stay square (u·n = 0), a revolute joint's axis
-    is n (u·δ = u·w = 0), a fixed joint keeps direction and normal (d·n = d·w = n'·w = 0). Of the joint that n
-    was made from, what holds anyway is left out. Legs on one rod keep the angle between their normals, that
-    of the home pose, or of the mechanism `spec["tied"]` at its home pose.
+    In the leg's frame (n, δ, w): a universal joint's two axes stay perpendicular (u·n = 0), a revolute
+    joint's axis is n (u·δ = u·w = 0), a fixed joint keeps direction and normal (d·n = d·w = n'·w = 0). Of the
+    joint that n was made from, what holds anyway is left out. Legs on one rod keep the angle between their
+    normals, that of the home pose, or of the mechanism `spec["tied"]` at its home pose.
     """
     R, o = jet(pose[0]), jet(pose[1])
     legs = legs_at(spec, (R, o))

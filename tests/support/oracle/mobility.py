@@ -19,7 +19,7 @@ class Mobility:
 
 
 def mobility(spec, pose) -> Mobility:
-    """Rank of the loop closures at a pose, with the rate of every joint freedom as an unknown.
+    """Rank of the loop closures at a pose, with the rate of every joint degree of freedom as an unknown.
 
     A chain of joint screws leads from the base over each leg to the platform; the first leg's chain closes a
     loop with every other one's. Legs on one rod share the rod's own joint.

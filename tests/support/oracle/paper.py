@@ -37,7 +37,7 @@ def paper_pose(x, y, z, alpha, beta, branch=1):
 
 @dataclass
 class Moving:
-    """What the paper's formulas of one leg start from."""
+    """Inputs of the paper's formulas of one leg."""
 
     v: np.ndarray
     omega: np.ndarray

@@ -30,7 +30,7 @@ def turn(phi):
 
 
 def axis_turn(axis: int, angle) -> Jet:
-    """The turn by `angle` (...,) about a coordinate axis."""
+    """The rotation by `angle` (...,) about a coordinate axis."""
     a = jet(angle)
     a = Jet(a.x[..., None], a.d[..., None], a.dd[..., None])
     basis = np.eye(3)
