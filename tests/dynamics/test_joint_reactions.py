@@ -16,72 +16,12 @@ import polypod as pp
 from polypod import Status
 from support import DATA
 from support import oracle as o
-from support.cases import ALL, FORCES, SEED, Case, agree, any_case, case, draw, per_pose, plain
+from support.cases import ALL, FORCES, SEED, Case, agree, any_case, case, per_pose
+from support.reactions import CLOSED, REDUNDANT, SAME, named, reactions, scale_of
 
-CLOSED = 1e-9  # of the largest reaction of a state: what a balance may leave
-SAME = 1e-8  # of the largest reaction: two systems of balances, times rounding and condition numbers
 REST = np.zeros(6)
 
 each = pytest.mark.parametrize("name", ALL)
-
-# Passive legs (marked by -) that repeat the constraints of another leg of their kind.
-REDUNDANT = {
-    "rps-again": ["RPS", "RPS-", "RPS", "RPS"],
-    "upu-twice-again": ["UPS", "UPU", "UPU-", "UPU-", "UPS", "SPU", "UPS"],
-    "rpu-again": ["RPU", "RPU-", "UPS", "SPU", "SPS"],
-    "fpu-again": ["FPU", "FPU-", "UPS", "SPS"],
-}
-
-
-# ------------------------------------------------------------------------------------------------------------
-# Mechanisms
-# ------------------------------------------------------------------------------------------------------------
-
-
-def twin_tables(name):
-    """A drawn mechanism in which passive legs repeat the constraints of another leg of their kind.
-
-    Their base joint is displaced to where that leg's constraints do not change: along the base axis for UPU
-    (and the platform joint along its own), across the axis for R, along the leg for F.
-    """
-    kinds = REDUNDANT[name]
-    tables = draw(name, kinds, np.random.default_rng([SEED, *name.encode()]))
-    spec, legs = o.read(tables), tables["legs"]
-    per = 1 / o._UNITS["length"][tables["units"]["length"]]
-    for i, kind in enumerate(kinds):
-        like = next(k for k, other in enumerate(kinds) if other.strip("-") == kind.strip("-"))
-        if not kind.endswith("-") or like == i:
-            continue
-        at = o.leg_at(spec, spec["legs"][like], o.home(spec))
-        step = {"U": at.base_axis, "R": np.cross(at.n.x, at.delta.x), "F": at.delta.x}[kind[0]]
-        legs[i] |= {side: dict(legs[like][side]) for side in ("base", "platform")}
-        legs[i]["base"]["point"] = np.array(legs[like]["base"]["point"]) - 0.1 * (i - like) * step * per
-        if kind.startswith("UPU"):
-            along = np.array(legs[like]["platform"]["axis"]) * 0.07 * (i - like) * per
-            legs[i]["platform"]["point"] = np.array(legs[like]["platform"]["point"]) + along
-    return plain(tables)
-
-
-@functools.cache
-def twin(name) -> Case:
-    tables = twin_tables(name)
-    spec = o.read(tables)
-    rng = np.random.default_rng(SEED + 5)
-    R, c = o.home(spec)
-    d = rng.uniform(-1, 1, size=(6, 6)) * ([0.08] * 3 + [0.3] * 3)
-    d[0] = 0.0
-    pose = o.close(spec, (o.turn(d[:, 3:]) @ R, c + d[:, :3]))
-    assert np.max(np.abs(o.residuals(spec, pose).x)) < 1e-13
-    twist, acceleration = o.feasible_motion(spec, pose, *rng.normal(size=(2, 6, 6)))
-    return Case(pp.Mechanism.from_dict(tables), spec, pose, twist, acceleration)
-
-
-def named(name) -> Case:
-    return twin(name) if name in REDUNDANT else any_case(name)
-
-
-def reactions(c: Case, **options):
-    return c.mech.joint_reactions(c.T, c.twist, c.acceleration, **options)
 
 
 # ------------------------------------------------------------------------------------------------------------
@@ -178,12 +118,6 @@ def left_over(c: Case, joints, found, given):
                 rest[link][:, :3] += sign * force
                 rest[link][:, 3:] += sign * (torque + np.cross(joint.point - given[link][1], force))
     return np.array([*rest.values()])
-
-
-def scale_of(c: Case, found):
-    """The largest reaction of each state, N: torques over the characteristic length."""
-    size = c.mech.characteristic_length
-    return np.maximum(np.max(np.abs(found / ([1.0] * 3 + [size] * 3)), axis=(1, 2)), 1e-3)
 
 
 # ------------------------------------------------------------------------------------------------------------
@@ -384,116 +318,6 @@ def test_length_weighs_couples_and_touches_nothing_determinate():
 
 
 # ------------------------------------------------------------------------------------------------------------
-# The paper's constraint forces
-# ------------------------------------------------------------------------------------------------------------
-
-
-def light(name) -> Case:
-    """The states with legs and rods that have no mass."""
-    c = any_case(name)
-    tables = c.mech.to_dict()
-    for rod in tables["rods"]:
-        for key in ("mass", "center", "inertia"):
-            del rod[key]
-    for leg in tables["legs"]:
-        del leg["cylinder"], leg["piston"]
-    return Case(pp.Mechanism.from_dict(tables), o.read(tables), c.pose, c.twist, c.acceleration)
-
-
-def on_rod(c: Case):
-    """Indices of the two coupled legs, of their platform joints among all, and c_1 (N, 3)."""
-    legs = [c.mech.leg_names.index(leg) for leg in c.mech.coupled_legs]
-    first = c.legs[legs[0]]
-    c1 = o.unit(o.cross(first.r, first.base_axis)).x
-    return legs, [len(c.spec["rods"]) + 3 * i + 2 for i in legs], c1
-
-
-def carried(c: Case, legs):
-    """Work (N, 6) on the six unit twists of the given forces of legs, and of the rod with its first leg."""
-    now, shifted = o.links_at(c.spec, c.jets), o.links_at(c.spec, o.six_directions(c.pose))
-    ours, at = [], 0
-    for link in now:
-        if link.name == "rod":
-            ours.append(on_rod(c)[0][0] in legs)
-        elif link.name == "platform":
-            ours.append(False)
-        else:
-            ours.append(at // 2 in legs)
-            at += 1
-    total = np.zeros_like(c.twist)
-    for link, moved, mine in zip(now, shifted, ours, strict=True):
-        if mine:
-            force, torque = o.link_wrench(link, c.spec["gravity"])
-            work = np.sum(moved.center.d * force + o.spin_of(moved.frame)[0] * torque, axis=-1)
-            total += np.moveaxis(work, 0, -1)
-    return total
-
-
-@pytest.mark.parametrize("name", ["lu", "rod-lined"])
-def test_coupled_forces_fall_out_of_massless_legs(name):
-    """f_c1, f_c3 are the forces along c_1 on the platform, T_c the torque on the rod [Eq. 44, put right]."""
-    c = light(name)
-    answer, dynamics = reactions(c), c.mech.inverse_dynamics(c.T, c.twist, c.acceleration)
-    coupled = c.mech.coupled_forces(c.T, dynamics.constraint)
-    _, above, c1 = on_rod(c)
-    size = scale_of(c, answer.reactions)
-    along = np.einsum("nja,na->nj", answer.reactions[:, above, :3], c1)
-    assert np.all(np.abs(along - coupled.forces) <= SAME * size[:, None])
-    assert np.all(np.abs(answer.reactions[:, above, 3:]) <= SAME * size[:, None, None])
-    # Leg 1 turns the rod about its line with T_c, leg 3 against it; told is what the rod does to them.
-    L, point = c.spec["rods"][0]["axis"], c.spec["rods"][0]["point"]
-    below = [k - 2 for k in above]
-    lever = answer.points[:, below] - point
-    about = (answer.reactions[:, below, 3:] + np.cross(lever, answer.reactions[:, below, :3])) @ L
-    torques = np.stack([-coupled.torque, coupled.torque], axis=-1)
-    assert np.all(np.abs(about - torques) <= SAME * size[:, None])
-    # Together with what couples there are they are the wrench f_c (c, τ).
-    row = c.mech.jacobian(c.T)[:, -1]
-    assert np.all(np.abs(answer.constraint_wrench - dynamics.constraint * row) <= SAME * size[:, None])
-
-
-@pytest.mark.parametrize("name", ["lu", "rod-lined"])
-def test_with_mass_they_are_what_legs_carry_and_the_coupled_forces(name):
-    """The effect of the legs' own mass at b, carried there as in [T14], is the whole difference."""
-    c = any_case(name)
-    answer, dynamics = reactions(c), c.mech.inverse_dynamics(c.T, c.twist, c.acceleration)
-    coupled = c.mech.coupled_forces(c.T, dynamics.constraint)
-    legs, above, c1 = on_rod(c)
-    size = scale_of(c, answer.reactions)
-    for i, leg in enumerate(legs):
-        own = carried(c, [leg])[:, :3]
-        along = np.einsum("na,na->n", answer.reactions[:, above[i], :3] - own, c1)
-        assert np.all(np.abs(along - coupled.forces[:, i]) <= SAME * size)
-    row = c.mech.jacobian(c.T)[:, -1]
-    whole = carried(c, legs) + dynamics.constraint * row
-    assert np.all(np.abs(answer.constraint_wrench - whole) <= SAME * size[:, None])
-
-
-@pytest.mark.parametrize("name", [*ALL, *REDUNDANT])
-def test_the_constraint_wrench_is_determinate(name):
-    """The sum over the legs that constrain the platform, active forces taken off; `least` has the same."""
-    c = named(name)
-    answer, mobility = reactions(c), c.mech.mobility()
-    legs = {leg for leg, _ in mobility.constraint_rows}
-    for rod in range(len(c.spec["rods"])):
-        carried_by_rod = [leg["name"] for leg in c.spec["legs"] if leg["base"]["rod"] == rod]
-        legs |= {*carried_by_rod} if len(carried_by_rod) > 1 else set()
-    center = c.pose[1]
-    for found in (answer.reactions, answer.least):
-        total = np.zeros((len(c.twist), 6))
-        for i, leg in enumerate(c.mech.leg_names):
-            if leg in legs:
-                k = len(c.spec["rods"]) + 3 * i + 2
-                force = found[:, k, :3]
-                total[:, :3] += force
-                total[:, 3:] += found[:, k, 3:] + np.cross(answer.points[:, k] - center, force)
-                at = c.legs[i]
-                axial = answer.reactions_in_joint[:, k - 1, 1:2] if c.spec["legs"][i]["actuated"] else 0.0
-                total -= axial * np.concatenate([at.delta.x, np.cross(at.e.x, at.delta.x)], axis=-1)
-        assert np.all(np.abs(answer.constraint_wrench - total) <= CLOSED * scale_of(c, found)[:, None])
-
-
-# ------------------------------------------------------------------------------------------------------------
 # Outcomes and shapes
 # ------------------------------------------------------------------------------------------------------------
 
@@ -623,7 +447,7 @@ def test_reactions_are_linear_in_the_load():
 def test_solutions_hold_reactions_if_asked(tmp_path, monkeypatch):
     mech = pp.load("lu-3spu-2rpu-r")
     motion = pp.load_motion("lu-3spu-2rpu-r", mech).sample(np.linspace(0.0, 1.0, 7))
-    monkeypatch.setattr("polypod.solution.solve.CHUNK", 4)
+    monkeypatch.setattr("polypod.solution.CHUNK", 4)
     plain_dataset = pp.solve(mech, motion).dataset
     solution = pp.solve(mech, motion, reactions=True)
     dataset = solution.dataset

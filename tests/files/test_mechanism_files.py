@@ -1,11 +1,9 @@
 """Mechanisms from files: bad ones refused with place and reason, good ones kept whole; mobility by ranks."""
 
-import copy
 import json
 import math
 import re
 import tomllib
-from collections import Counter
 from pathlib import Path
 from typing import Any
 
@@ -16,36 +14,9 @@ import tomli_w
 import polypod as pp
 from polypod.errors import MechanismError, UnknownNameError
 from polypod.files.units import from_si, to_si
-from support import DATA, ROOT
-
-BUILT_IN = "lu-3spu-2rpu-r"
-FILES = {
-    BUILT_IN: ROOT / f"python/polypod/mechanisms/{BUILT_IN}.toml",
-    **{name: DATA / f"{name}.toml" for name in ("stewart-gough", "3-rps")},
-}
-TABLES = {name: tomllib.loads(path.read_text(encoding="utf-8")) for name, path in FILES.items()}
-PAPER, GOUGH, RPS = FILES
+from support.mechanism_files import BUILT_IN, DELETED, FILES, GOUGH, MIDDLE, PAPER, RPS, TABLES, UP, changed
 
 UNIT_ROUNDING = 1e-15  # m, of points about 1 m away: a few roundings, of sine and cosine and of the unit
-
-DELETED = object()
-
-
-def changed(name: str, **changes: Any) -> dict[str, Any]:
-    """A file's tables with other values at places such as legs__3__stroke, counted from 1."""
-    tables = copy.deepcopy(TABLES[name])
-    for place, value in changes.items():
-        target: Any = tables
-        *parents, last = [int(key) - 1 if key.isdigit() else key for key in place.split("__")]
-        for key in parents:
-            target = target[key]
-        if value is DELETED:
-            del target[last]
-        elif isinstance(target, list) and last == len(target):  # one past the end
-            target.append(value)
-        else:
-            target[last] = value
-    return tables
 
 
 def faults_of(tables: dict[str, Any]) -> list[tuple[str, str]]:
@@ -54,11 +25,6 @@ def faults_of(tables: dict[str, Any]) -> list[tuple[str, str]]:
     return [(fault.place, fault.message) for fault in caught.value.faults]
 
 
-# --- bad input ----------------------------------------------------------------------------------------------
-
-LEG = TABLES[PAPER]["legs"][4]
-MIDDLE = [0.0, 0.0, 0.0]
-UP = {"joint": "U", "point": MIDDLE, "axis": [0, 0, 1]}
 FIXED = {"joint": "F", "point": [300.0, 0.0, 0.0], "axis": [0, 0, 1], "normal": [1, 0, 0]}
 SQUARE = {"joint": "U", "point": {"radius": 150.0, "angle": 0.0}, "axis": [0.0, 1.0, 0.5]}
 
@@ -306,7 +272,7 @@ def test_a_file_that_is_no_toml_is_named_with_the_line(tmp_path: Path) -> None:
 def test_a_file_that_is_no_utf_8_is_named(tmp_path: Path) -> None:
     path = tmp_path / "bad.toml"
     path.write_bytes('name = "Kräfte"\n'.encode("latin-1"))
-    with pytest.raises(MechanismError, match=r"file: is not UTF-8 text: .*0xe4 in position 10") as caught:
+    with pytest.raises(MechanismError, match=r"toml: is not UTF-8 text: .*0xe4 in position 10") as caught:
         pp.load(path)
     assert str(path) in str(caught.value)
 
@@ -440,92 +406,6 @@ def test_defaults_of_a_leg_without_stroke() -> None:
     mech = pp.Mechanism.from_dict(changed(GOUGH, legs__2__stroke=DELETED))
     assert mech.stroke.tolist() == [[0.55, 0.85], [0, math.inf], *[[0.55, 0.85]] * 4]
     assert pp.load(FILES[GOUGH]).warnings == []
-
-
-def test_mobility_of_the_paper() -> None:
-    m = pp.load(BUILT_IN).mobility()
-    assert (m.dof, m.joint_freedoms, m.links, m.joints, m.loops) == (5, 27, 13, 16, 4)
-    assert (m.closure_rank, m.redundant, m.redundant_legs) == (22, 2, ("1", "3"))
-    assert (m.passive, m.passive_legs) == (0, ())
-    assert m.constraint_rows == (("1", "A"), ("3", "A"), ("3", "E"))
-    assert m.independent_rows == (0,)
-    assert m.published is not None
-    assert (m.published.dof, m.published.redundant, m.published.passive) == (5, 3, 1)
-
-
-def eq1(m: Any, redundant: int, passive: int) -> int:
-    """M of Eq. 1."""
-    freedoms: int = 6 * (m.links - m.joints - 1) + m.joint_freedoms + redundant - passive
-    return freedoms
-
-
-def test_graph_of_the_paper() -> None:
-    """Fig. 1b: a quaternary base, a pentagonal platform, a ternary rod and ten binary links."""
-    m = pp.load(BUILT_IN).mobility()
-    assert [(link.name, len(link.joints)) for link in m.graph_links[:3]] == [
-        ("base", 4),
-        ("platform", 5),
-        ("rod L", 3),
-    ]
-    assert [len(link.joints) for link in m.graph_links[3:]] == [2] * 10
-    assert Counter(joint.kind for joint in m.graph_joints) == {"R": 3, "P": 5, "U": 5, "S": 3}
-    for i, joint in enumerate(m.graph_joints):
-        assert [i in link.joints for link in m.graph_links] == [k in joint.links for k in range(13)]
-    assert eq1(m, m.redundant, m.passive) == m.dof
-    assert eq1(m, m.published.redundant, m.published.passive) == m.dof
-
-
-def gough(joint: str, **more: Any) -> dict[str, Any]:
-    """The Stewart-Gough platform with these joints at the base."""
-    tables = changed(GOUGH)
-    for leg in tables["legs"]:
-        leg["base"] = {"joint": joint, "point": leg["base"]["point"]} | more
-    return tables
-
-
-def test_mobility_of_6_sps_has_the_spin_of_each_leg() -> None:
-    mech = pp.Mechanism.from_dict(gough("S"))
-    m = mech.mobility()
-    assert (m.dof, m.links, m.joints, m.joint_freedoms, m.loops) == (6, 14, 18, 42, 5)
-    assert (m.closure_rank, m.redundant, m.redundant_legs) == (30, 0, ())
-    assert (m.passive, m.passive_legs) == (6, tuple("123456"))
-    assert m.constraint_rows == m.independent_rows == ()
-    assert eq1(m, 0, 6) == 6
-    assert any("legs 1, 2, 3, 4, 5, 6 spin freely" in warning for warning in mech.warnings)
-
-
-def test_mobility_of_6_ups() -> None:
-    m = pp.load(FILES[GOUGH]).mobility()
-    assert (m.dof, m.joint_freedoms, m.closure_rank, m.redundant, m.passive) == (6, 36, 30, 0, 0)
-
-
-def test_mobility_of_3_rps() -> None:
-    m = pp.load(FILES[RPS]).mobility()
-    assert (m.dof, m.links, m.joints, m.joint_freedoms, m.loops) == (3, 8, 9, 15, 2)
-    assert (m.closure_rank, m.redundant, m.passive) == (12, 0, 0)
-    assert m.constraint_rows == (("1", "B"), ("2", "B"), ("3", "B"))
-    assert m.independent_rows == (0, 1, 2)
-
-
-def test_mobility_of_a_tricept() -> None:
-    """3-UPS and a passive UPF leg in the middle, which leaves the platform two turns and a stroke."""
-    tables = gough("U", axis=[1.0, 0.0, 0.0])
-    centre = {
-        "name": "centre",
-        "actuated": False,
-        "base": UP | {"axis": [1, 0, 0]},
-        "platform": {"joint": "F", "point": MIDDLE, "axis": [0, 0, 1], "normal": [0, 1, 0]},
-    }
-    tables["legs"] = [*tables["legs"][::2], centre]
-    mech = pp.Mechanism.from_dict(tables)
-    m = mech.mobility()
-    assert mech.leg_letters[-1] == "UPF"
-    assert mech.leg_names == ("1", "2", "3", "centre")
-    assert mech.actuated.tolist() == [True, True, True, False]
-    assert (m.dof, m.redundant, m.passive) == (3, 0, 0)
-    assert {leg for leg, _ in m.constraint_rows} == {"centre"}
-    assert len(m.independent_rows) == 3
-    assert eq1(m, 0, 0) == 3
 
 
 @pytest.mark.parametrize(("degrees", "sound"), [(1e-5, True), (1e-3, False)])

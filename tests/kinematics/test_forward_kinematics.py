@@ -4,314 +4,35 @@ from __future__ import annotations
 
 import copy
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 import polypod as pp
 from polypod import Status
 from polypod.errors import ShapeError, UnsupportedError
-from support import DATA, ROOT, oracle
+from support import ROOT, oracle
+from support.assembly import (
+    APART,
+    FLAT,
+    HEXAPOD,
+    LENGTH,
+    LU,
+    MECHANISMS,
+    Array,
+    code,
+    determinant,
+    differs,
+    lengths_at,
+    sampled,
+    singular_pose,
+)
 
-Array = NDArray[np.float64]
-
-LU = pp.load("lu-3spu-2rpu-r")
-HEXAPOD = pp.load(DATA / "stewart-gough.toml")
-RPS = pp.load(DATA / "3-rps.toml")
-MECHANISMS = {mech.name: mech for mech in (LU, HEXAPOD, RPS)}
 NATURAL = {"alpha": 0.1, "p": -0.3, "h": 0.62, "beta": 0.7, "gamma": 0.6}
-FLAT = {"alpha": 0.1, "p": 0.3, "h": 0.7, "gamma": -0.06}  # det J changes its sign near beta = 0.075 rad
-
-LENGTH = 1e-12  # m, of legs about 1 m long: rounding of lengths at a pose that Newton's method ended in
 POSE = 1e-10  # 1 and m: the same for a pose that is not nearly singular
-APART = 1e-6  # 1 and m: two modes of generic lengths are farther from each other
 ANSWERS = [Status.OK, Status.OUT_OF_STROKE, Status.OUT_OF_CONE, Status.OUT_OF_ANGLE]
-
-
-def code(status: Any) -> Status:
-    return Status(int(status))
-
-
-def lengths_at(mech: pp.Mechanism, pose: Array) -> Array:
-    return mech.inverse_kinematics(pose).lengths
-
-
-def sampled(mech: pp.Mechanism, rng: np.random.Generator, count: int, spread: float = 1.0) -> Array:
-    """Poses (count, 4, 4) over the workspace that keep all constraints, `spread` the share of it."""
-    q: dict[str, Array]
-    if "natural" in mech.coordinate_sets:
-        middle, width = [0.0, 0.0, 0.65, 0.0, 0.0], [0.5, 0.35, 0.12, 0.9, 0.9]
-        values = np.array(middle) + spread * np.array(width) * rng.uniform(-1, 1, (count, 5))
-        q = dict(zip(mech.coordinate_sets["natural"], values.T, strict=True))
-    else:
-        names = mech.coordinate_sets["pose"] if mech.dof == 6 else ("z", "rx", "ry")
-        width = {"x": 0.15, "y": 0.15, "z": 0.08, "rx": 0.4, "ry": 0.4, "rz": 0.4}
-        home = mech.coordinates(mech.home, "pose")
-        q = {n: home[n] + spread * width[n] * rng.uniform(-1, 1, count) for n in names}
-    return mech.pose(q)
-
-
-def differs(a: Array, b: Array) -> Array:
-    """(...): the largest difference of entries, 1 and m."""
-    return np.abs(a - b).max(axis=(-1, -2))
-
-
-def determinant(mech: pp.Mechanism, pose: Array) -> Array:
-    return np.linalg.det(mech.jacobian(pose))
-
-
-# --- a search of its own ------------------------------------------------------------------------------------
-
-
-def equations(mech: pp.Mechanism, lengths: Array, pose: tuple[Array, Array]) -> tuple[Array, Array]:
-    """Residuals of lengths and joints at poses (N, 3, 3) and (N, 3), real or complex; and rows by (v, ω).
-
-    r·r = ℓ² for actuated legs; for a leg on a rod: r, the rod's line and the platform's axis in one plane;
-    for an R joint: r at right angles to its axis.
-    """
-    R, o = pose
-    values, rows = [], []
-
-    def turned(a: Array) -> Array:
-        """Of a vector of the platform, its rate by (v, ω): (N, 3, 6)."""
-        x, y, z = np.moveaxis(a, -1, 0)
-        n = np.zeros_like(x)
-        cross = np.array([[n, z, -y], [-z, n, x], [y, -x, n]])
-        return np.concatenate([np.zeros_like(R), np.moveaxis(cross, -1, 0)], axis=-1)
-
-    geometry = mech.geometry
-    for leg, length in zip(geometry["legs"], lengths, strict=True):
-        base, platform = leg["base"], leg["platform"]
-        e = R @ np.array(platform["point"])
-        r = o + e - np.array(base["point"])
-        rate = turned(e) + np.eye(3, 6)
-        if leg["actuated"]:
-            values.append(np.sum(r * r, axis=-1) - length**2)
-            rows.append(2 * np.einsum("ni,nij->nj", r, rate))
-        if base["rod"] is not None:
-            line, a = np.array(geometry["rods"][base["rod"]]["axis"]), R @ np.array(platform["axis"])
-            values.append(np.cross(a, r) @ line)
-            by_axis = np.einsum("ni,nij->nj", np.cross(r, line), turned(a))
-            rows.append(by_axis + np.einsum("ni,nij->nj", np.cross(line, a), rate))
-        elif base["joint"] == "R":
-            values.append(r @ np.array(base["axis"]))
-            rows.append(np.einsum("i,nij->nj", np.array(base["axis"]), rate))
-    return np.stack(values, axis=-1), np.stack(rows, axis=-2)
-
-
-def cayley(w: Array) -> Array:
-    """A rotation (N, 3, 3) for real w, a complex orthogonal matrix for complex w."""
-    x, y, z = np.moveaxis(w, -1, 0) / 2
-    n = np.zeros_like(x)
-    half = np.moveaxis(np.array([[n, -z, y], [z, n, -x], [-y, x, n]]), -1, 0)
-    return np.linalg.solve(np.eye(3) - half, np.eye(3) + half)
-
-
-def search(
-    mech: pp.Mechanism, lengths: Array, starts: int, rng: np.random.Generator, over: type = float
-) -> Array:
-    """Different poses (k, 4, 4) that least-squares Newton steps find from random ones all over the space."""
-
-    def random(size: float) -> Array:
-        values = rng.normal(size=(starts, 3)) * size
-        return values + 1j * rng.normal(size=(starts, 3)) * size if over is complex else values
-
-    scale = np.array([1, 1, 1, *[mech.characteristic_length] * 3])
-    R, o = cayley(random(2.0)), random(0.6 * np.abs(lengths).max())
-    if over is complex:  # complex solutions may be far away
-        o = o * 10.0 ** rng.uniform(0, 3, (starts, 1))
-    for _ in range(80):
-        value, rows = equations(mech, lengths, (R, o))
-        step = -np.einsum("nij,nj->ni", np.linalg.pinv(rows / scale, rcond=1e-10), value)
-        longest = 0.4 + 0.4 * np.linalg.norm(o, axis=-1, keepdims=True) / mech.characteristic_length
-        step *= np.minimum(1, longest / np.maximum(np.linalg.norm(step, axis=-1, keepdims=True), 1e-300))
-        step /= scale
-        R, o = cayley(step[:, 3:]) @ R, o + step[:, :3]
-    value, rows = equations(mech, lengths, (R, o))
-    size = 1 + np.maximum(np.abs(R).max(axis=(-1, -2)), np.abs(o).max(axis=-1))
-    met = np.abs(value).max(axis=-1) < 1e-11 * size**2
-    pose = np.concatenate([R, o[:, :, None]], axis=-1)[met]
-    found: list[Array] = []
-    for candidate in pose:
-        if not found or differs(np.array(found), candidate).min() > APART:
-            found.append(candidate)
-    return np.array(found).reshape(-1, 3, 4)
-
-
-def check_modes(mech: pp.Mechanism, pose: Array, rng: np.random.Generator, starts: int) -> int:
-    """That the modes of a pose's lengths are those of a search; how many there are."""
-    lengths = lengths_at(mech, pose)
-    modes = mech.assembly_modes(lengths)
-    known = modes.pose[: modes.number]
-    assert code(modes.status) == Status.OK
-    assert differs(known, pose).min() < APART
-    assert np.abs(lengths_at(mech, known) - lengths).max() < LENGTH
-    assert (modes.multiplicity[: modes.number] == 1).all()
-    assert (modes.determinant_sign == np.sign(determinant(mech, known))).all()
-    for found in search(mech, lengths, starts, rng):
-        assert differs(known[:, :3], found).min() < APART, (mech.name, lengths.tolist())
-    return int(modes.number)
-
-
-@pytest.mark.parametrize("mech", [LU, HEXAPOD], ids=lambda m: m.name)
-def test_all_modes_are_those_of_a_search(mech: pp.Mechanism):
-    rng = np.random.default_rng(5)
-    counts = [check_modes(mech, pose, rng, 300) for pose in sampled(mech, rng, 12)]
-    assert min(counts) >= 2
-    assert all(count % 2 == 0 for count in counts)
-
-
-def test_all_modes_of_a_3_rps_are_those_of_a_search():
-    rng = np.random.default_rng(6)
-    counts = {check_modes(RPS, pose, rng, 200) for pose in sampled(RPS, rng, 4)}
-    assert max(counts) == 16
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("mech", MECHANISMS.values(), ids=MECHANISMS)
-def test_all_modes_of_many_lengths_are_those_of_a_search(mech: pp.Mechanism):
-    rng = np.random.default_rng(7)
-    for pose in sampled(mech, rng, 100):
-        check_modes(mech, pose, rng, 400)
-
-
-def test_the_search_meets_the_equations_of_the_oracle():
-    """So that both do not share a mistake in the equations."""
-    rng = np.random.default_rng(8)
-    for mech in MECHANISMS.values():
-        spec = oracle.read(mech.to_dict())
-        lengths = lengths_at(mech, sampled(mech, rng, 1)[0])
-        found = search(mech, lengths, 50, rng)
-        pose = (found[:, :, :3], found[:, :, 3])
-        assert len(found) > 3
-        assert np.abs(oracle.lengths(spec, pose).x - lengths).max() < 1e-10
-        assert np.abs(oracle.residuals(spec, pose).x).max() < 1e-9
-
-
-# --- how many -----------------------------------------------------------------------------------------------
-
-
-def general_hexapod(seed: int) -> pp.Mechanism:
-    """A 6-UPS whose joints lie in no plane."""
-    rng = np.random.default_rng(seed)
-    data = HEXAPOD.to_dict()
-    for leg in data["legs"]:
-        leg["base"] |= {"point": rng.uniform(-500, 500, 3).tolist(), "axis": [1.0, 0.2, 0.1]}
-        leg["platform"]["point"] = rng.uniform(-300, 300, 3).tolist()
-        del leg["stroke"]
-    return pp.Mechanism.from_dict(data)
-
-
-def planar_hexapod(seed: int) -> pp.Mechanism:
-    """A 6-UPS with all base joints in one plane and all platform joints in another."""
-    data = general_hexapod(seed).to_dict()
-    for leg in data["legs"]:
-        leg["base"]["point"][2] = leg["platform"]["point"][2] = 0.0
-    return pp.Mechanism.from_dict(data)
-
-
-@pytest.mark.parametrize("seed", [2, 4])
-@pytest.mark.parametrize("make", [general_hexapod, planar_hexapod])
-def test_a_general_hexapod_has_forty_complex_modes(make: Callable[[int], pp.Mechanism], seed: int):
-    """Ronga and Vust, Mourrain; Raghavan by continuation. Some of these have coordinates in the thousands."""
-    assert make(seed)._core.complex_modes() == 40
-
-
-@pytest.mark.slow
-def test_of_many_general_hexapods_hardly_one_lacks_a_complex_mode():
-    """Of solutions farther away than double precision can follow there may be some; none are found twice."""
-    counts = [
-        make(seed)._core.complex_modes() for make in (general_hexapod, planar_hexapod) for seed in range(40)
-    ]
-    assert max(counts) == 40
-    assert counts.count(40) >= 78
-
-
-def test_complex_modes_of_the_files():
-    """16 for a 3-RPS, as for the 6-3 platform (Nanua, Waldron, Murthy, 1990) that it is with locked legs."""
-    counts = {name: mech._core.complex_modes() for name, mech in MECHANISMS.items()}
-    assert counts == {"lu-3spu-2rpu-r": 52, "stewart-gough": 28, "3-rps": 16}
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", MECHANISMS)
-def test_complex_modes_are_those_of_a_search(name: str):
-    mech, rng = MECHANISMS[name], np.random.default_rng(9)
-    lengths = lengths_at(mech, sampled(mech, rng, 1)[0])
-    lengths = lengths + 0.1 * rng.uniform(-1, 1, lengths.shape) * (1 + 1j)
-    assert len(search(mech, lengths, 6000, rng, complex)) == mech._core.complex_modes()
-
-
-def test_modes_come_in_mirror_pairs_where_the_joints_lie_in_planes():
-    rng = np.random.default_rng(10)
-    flip = np.diag([1.0, 1.0, -1.0])
-    for mech in (LU, HEXAPOD, RPS):
-        modes = mech.assembly_modes(lengths_at(mech, sampled(mech, rng, 5)))
-        for poses, count, above in zip(modes.pose, modes.number, modes.above, strict=True):
-            assert count % 2 == 0
-            assert above[: count // 2].all()
-            assert not above[count // 2 : count].any()
-            for pose in poses[:count]:
-                image = np.eye(4)
-                image[:3, :3], image[:3, 3] = flip @ pose[:3, :3] @ flip, flip @ pose[:3, 3]
-                assert differs(poses[:count], image).min() < APART
-
-
-def test_without_planes_there_are_no_pairs():
-    mech = general_hexapod(2)
-    modes = mech.assembly_modes(lengths_at(mech, mech.home))
-    poses = modes.pose[: modes.number]
-    image = mech.home
-    image[2, 3] *= -1
-    assert code(modes.status) == Status.OK
-    assert differs(poses, mech.home).min() < APART
-    assert differs(poses, image).min() > 0.01
-
-
-def test_modes_are_ordered_from_above_and_padded():
-    rows = np.array([[0.769, 0.85, 0.769, 0.65, 0.65], [0.1] * 5, [math.nan] * 5])
-    modes = LU.assembly_modes(rows)
-    assert modes.number.tolist() == [8, 0, 0]
-    assert [code(s) for s in modes.status] == [Status.OK, Status.OK, Status.INVALID_INPUT]
-    # Some are as high as others, up to rounding.
-    assert (np.diff(modes.pose[0, :, 2, 3]) <= 1e-9).all()
-    assert np.isnan(modes.pose[1:]).all()
-    assert (modes.mode_status[1:] == Status.INVALID_INPUT).all()
-    shaped = LU.assembly_modes(rows[None, :, None])
-    assert shaped.number.shape == shaped.status.shape == (1, 3, 1)
-    assert shaped.pose.shape == (1, 3, 1, 8, 4, 4)
-    assert shaped.multiplicity.shape == shaped.mode_status.shape == (1, 3, 1, 8)
-
-
-def test_modes_that_meet_are_one_of_multiplicity_two():
-    pose = singular_pose()
-    modes = LU.assembly_modes(lengths_at(LU, pose))
-    assert code(modes.status) == Status.SINGULAR
-    meeting = int(differs(modes.pose[: modes.number], pose).argmin())
-    assert differs(modes.pose[meeting], pose) < 1e-5
-    assert modes.multiplicity[meeting] == 2
-    assert modes.determinant_sign[meeting] == 0
-    assert code(modes.mode_status[meeting]) == Status.SINGULAR
-
-
-def test_modes_know_their_limits():
-    """Lengths at the very ends of strokes are within them; a joint beyond its cone is told."""
-    ends = np.array([[0.75, 0.85, 0.75, 0.65, 0.65], [0.65, 0.72, 0.85, 0.85, 0.72], [0.65] * 5, [0.85] * 5])
-    modes = LU.assembly_modes(ends)
-    assert modes.number.min() > 0
-    assert set(modes.mode_status[np.isfinite(modes.residual)]) == {Status.OK}
-    beyond = LU.assembly_modes(ends + np.array([0, 1e-9, 0, 0, 0]))
-    assert set(beyond.mode_status[0, : beyond.number[0]]) == {Status.OUT_OF_STROKE}
-    found = LU.forward_kinematics(ends[2], modes.pose[2, 0])
-    assert code(found.status) == Status.OK
-    assert (
-        code(LU.forward_kinematics(ends[2] - [1e-9, 0, 0, 0, 0], found.pose).status) == Status.OUT_OF_STROKE
-    )
-    head = RPS.assembly_modes(lengths_at(RPS, RPS.home))
-    assert [code(s) for s in head.mode_status[:2]] == [Status.OK, Status.OUT_OF_CONE]
 
 
 # --- from lengths to a pose and back ------------------------------------------------------------------------
@@ -533,22 +254,6 @@ def test_a_guess_far_away_never_gives_a_wrong_pose():
     assert 20 < stands.sum() < 200
     assert np.abs(lengths_at(LU, found.pose[stands]) - lengths[stands]).max() < LENGTH
     assert np.isnan(found.pose[found.status == Status.NOT_CONVERGED]).all()
-
-
-def singular_pose(
-    mech: pp.Mechanism = LU,
-    others: dict[str, float] = FLAT,
-    name: str = "beta",
-    low: float = 0,
-    high: float = 0.25,
-) -> Array:
-    """Where det J vanishes up to rounding on a line of coordinates, by bisection."""
-    below = np.sign(determinant(mech, mech.pose({**others, name: low})))
-    for _ in range(60):
-        middle = (low + high) / 2
-        same = np.sign(determinant(mech, mech.pose({**others, name: middle}))) == below
-        low, high = (middle, high) if same else (low, middle)
-    return mech.pose({**others, name: low})
 
 
 def test_a_singular_guess():

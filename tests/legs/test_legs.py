@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
 from typing import get_args
 
 import pytest
@@ -15,10 +13,7 @@ from polypod.files.mechanism_spec import DRIVE_TABLES
 from polypod.files.units import si_unit
 from polypod.legs.drives import DRIVES, KEYED, LINK_PLACE, drive_of_letters
 from polypod.legs.joints import JOINTS, JointLetter
-
-sys.path.insert(0, str(Path(__file__).parent))
-
-import sliders
+from support import sliders
 
 BUILT_IN = ("hexaglide", "4pss-upu", "lu-3spu-2rpu-r", "3-rps", "4ups-up", "2rpu-spr")
 

@@ -21,6 +21,7 @@ from polypod import SingularityKind, Status
 from polypod.errors import UnsupportedError
 from polypod.summary.mechanism_facts import catalogue
 from support.pages import DOCS, read
+from support.pose_search import search
 
 Array = NDArray[np.float64]
 
@@ -375,8 +376,6 @@ def test_octahedral_example() -> None:
 
 def test_octahedral_eliminant() -> None:
     """Its printed coefficients, by a search for all complex poses with equations of its own."""
-    import test_forward
-
     printed = {  # power of the third corner's height: coefficient
         14: (233520143876274504789, 242177763763360000),
         12: (7255016240942576514134370463827, 34830199726657445888000000),
@@ -385,7 +384,7 @@ def test_octahedral_eliminant() -> None:
         6: (2893043016821964206280419999396021687312902961, 584353784137272927671287808000000000),
     }
     mech, lengths = load("octahedral-3-3"), np.array([6.0, 12.0, 7.0, 11.0, 9.0, 13.0])
-    poses = test_forward.search(mech, lengths, 600, np.random.default_rng(SEED), over=complex)
+    poses = search(mech, lengths, 600, np.random.default_rng(SEED), over=complex)
     assert len(poses) == 16
     corner = np.array(mech.geometry["legs"][4]["platform"]["point"])
     coefficients = np.poly(poses[:, 2, :3] @ corner + poses[:, 2, 3])

@@ -3,34 +3,28 @@
 from __future__ import annotations
 
 import copy
-import json
-from dataclasses import replace
 
 import numpy as np
 import pytest
 
 import polypod as pp
-from polypod import Motion, SingularityKind, Status, _core
-from polypod.solution.singularity_crossings import find_passages, warnings_of
-from support import DATA
+from polypod import Status, _core
 from support import oracle as o
+from support.singular import (
+    ALL,
+    GOUGH,
+    LU,
+    NATURAL,
+    QUARTER,
+    RPS,
+    SPECS,
+    Kind,
+    hexapod,
+    independent_jacobian,
+    matrix,
+)
 
-LU = pp.load("lu-3spu-2rpu-r")
-GOUGH = pp.load(DATA / "stewart-gough.toml")
-RPS = pp.load(DATA / "3-rps.toml")
-ALL = {"lu": LU, "stewart-gough": GOUGH, "3-rps": RPS}
-SPECS = {name: o.read(mech.to_dict()) for name, mech in ALL.items()}
-NATURAL = {"alpha": 0.1, "p": -0.3, "h": 0.62, "beta": 0.7, "gamma": 0.6}
 REST = np.zeros(6)
-Kind = SingularityKind
-
-
-def matrix(pose) -> np.ndarray:
-    """(R, o) as homogeneous matrices."""
-    R, p = (o.jet(part).x for part in pose)
-    T = np.zeros((*p.shape[:-1], 4, 4))
-    T[..., :3, :3], T[..., :3, 3], T[..., 3, 3] = R, p, 1.0
-    return T
 
 
 def random_poses(name: str, n: int = 20):
@@ -40,15 +34,6 @@ def random_poses(name: str, n: int = 20):
     size = o.characteristic_length(SPECS[name])
     start = o.turn(0.3 * rng.uniform(-1, 1, (n, 3))) @ R, p + 0.3 * size * rng.uniform(-1, 1, (n, 3))
     return o.close(SPECS[name], start)
-
-
-def independent_jacobian(name: str, pose, length: float) -> np.ndarray:
-    """Legs over constraints, differentiated from positions, torque columns divided by the length."""
-    rows = [o.leg_gradient(SPECS[name], pose)]
-    if name != "stewart-gough":
-        k = 6 - ALL[name].dof
-        rows.append(o.gradient(lambda p: o.theory_constraints(SPECS[name], p), pose)[..., :k, :])
-    return np.concatenate(rows, axis=-2) / np.array([1, 1, 1, length, length, length])
 
 
 # --- measures -----------------------------------------------------------------------------------------------
@@ -257,16 +242,6 @@ def test_constraint_singularity_of_the_3_rps(turned):
         assert RPS.singularity(pose, tolerance=0.01).kind == Kind.CONSTRAINT
 
 
-def hexapod(base, platform, position) -> pp.Mechanism:
-    """6-SPS with its home at a pose, platform parallel to the base."""
-    legs = [
-        {"base": {"joint": "S", "point": [*b]}, "platform": {"joint": "S", "point": [*p]}}
-        for b, p in zip(base, platform, strict=True)
-    ]
-    tables = {"name": "hexapod", "units": {"length": "m", "angle": "rad"}, "home": {"position": [*position]}}
-    return pp.Mechanism.from_dict({**tables, "legs": legs})
-
-
 def test_legs_that_all_meet_a_line_leave_the_turn_about_it():
     """A special linear complex: platform and two base joints in one plane, legs in pairs on three points."""
     corners = np.array([[-0.2, 0.0, 0.3], [0.2, 0.0, 0.3], [0.0, 0.0, -0.1]])
@@ -290,9 +265,6 @@ def test_legs_square_to_a_direction_leave_the_translation_along_it():
     assert abs(found.axis) == pytest.approx([1, 0, 0], abs=1e-9)
     assert found.point.tolist() == mech.home[:3, 3].tolist()
     assert_uncontrolled(mech, None, mech.home, found)
-
-
-QUARTER = {"x": 0.0, "y": 0.0, "z": 0.6, "rx": 0.0, "ry": 0.0, "rz": np.pi / 2}
 
 
 def test_a_quarter_turn_of_a_hexapod_is_a_screw():
@@ -343,241 +315,3 @@ def test_kinds_are_those_of_the_core():
     core = {(code, name.upper()) for code, name, _ in _core.singularity_kinds()}
     assert core == {(k.value, k.name.replace("_", "")) for k in Kind if k != Kind.UNKNOWN}
     assert all(k.message for k in Kind)
-
-
-# --- along a motion -----------------------------------------------------------------------------------------
-
-
-def yaw(curve, n: int) -> Motion:
-    """The hexapod rotated about z by a function of time in [0, 1]."""
-    fine = np.linspace(0.0, 1.0, 201)
-    q = {name: np.full(201, value) for name, value in QUARTER.items()} | {"rz": curve(fine)}
-    return Motion.through(fine, q, set="pose").sample(np.linspace(0.0, 1.0, n))
-
-
-@pytest.mark.parametrize("n", [2, 3, 8, 101])
-def test_a_crossing_is_found_between_samples(n):
-    solution = pp.solve(GOUGH, yaw(lambda t: 1.2 + 0.6 * t, n))
-    (crossing,) = solution.singularities["crossings"]
-    assert crossing["time"] == pytest.approx((np.pi / 2 - 1.2) / 0.6, abs=1e-9)
-    assert (crossing["kind"], crossing["leg"]) == ("ACTUATION", None)
-    assert crossing["crosses"]
-    assert crossing["found"]
-    det = solution.dataset.determinant.values
-    assert det[0] * det[-1] < 0
-    (near,) = solution.singularities["near"]
-    assert near["start"] - 1e-9 <= crossing["time"] <= near["end"] + 1e-9
-    assert near["minimum"] < 1e-9
-    assert near["time"] == pytest.approx(crossing["time"], abs=1e-6)
-
-
-@pytest.mark.parametrize("n", [3, 4, 8, 101])
-def test_two_crossings_between_samples_of_one_sign_are_found(n):
-    solution = pp.solve(GOUGH, yaw(lambda t: np.pi / 2 + 0.01 - (t - 0.45) ** 2, n))
-    times = [c["time"] for c in solution.singularities["crossings"]]
-    assert times == pytest.approx([0.35, 0.55], abs=1e-9)
-    if n == 4:
-        assert len({*np.sign(solution.dataset.determinant.values)}) == 1, "the samples do not show it"
-
-
-@pytest.mark.parametrize("n", [3, 8, 101])
-@pytest.mark.parametrize("half", [2e-3, 5e-5])
-def test_two_crossings_shortly_after_one_another_are_two(n, half):
-    """Far nearer to each other than samples are, but farther than rounding could part one that is touched."""
-    solution = pp.solve(GOUGH, yaw(lambda t: np.pi / 2 + half**2 - (t - 0.45) ** 2, n))
-    found = solution.singularities["crossings"]
-    assert [c["time"] for c in found] == pytest.approx([0.45 - half, 0.45 + half], abs=1e-8)
-    assert all(c["crosses"] and c["found"] for c in found)
-
-
-@pytest.mark.parametrize("n", [3, 4, 8, 101])
-@pytest.mark.parametrize(("margin", "touches"), [(0.0, True), (1e-4, False)])
-def test_a_touched_singularity_is_found_and_a_near_miss_is_none(n, margin, touches):
-    solution = pp.solve(GOUGH, yaw(lambda t: np.pi / 2 - margin - (t - 0.45) ** 2, n))
-    found = solution.singularities["crossings"]
-    assert [c["time"] for c in found] == pytest.approx([0.45] if touches else [], abs=1e-6)
-    assert not any(c["crosses"] for c in found)
-    (near,) = solution.singularities["near"]
-    assert near["time"] == pytest.approx(0.45, abs=1e-6)
-    assert near["minimum"] == pytest.approx(0.0, abs=1e-3)
-    assert near["minimum"] > 1e-6 or touches
-
-
-def test_a_rest_at_a_singular_pose_is_one_finding():
-    time = np.linspace(0, 1, 21)
-    q = {name: np.full(21, value) for name, value in QUARTER.items()}
-    findings = pp.solve(GOUGH, Motion.through(time, q, set="pose")).singularities
-    assert len(findings["crossings"]) == 1
-    assert [(p["start"], p["end"]) for p in findings["near"]] == [(0.0, 1.0)]
-
-
-def test_near_passages_have_their_own_kind_and_leg():
-    """Down to the rod's line and up again: constraint and frames of legs 1 and 3."""
-    time = np.linspace(0, 1, 41)
-    still = np.ones(41)
-    h = 0.0005 + 0.2 * (time - 0.5) ** 2
-    q = {"alpha": 0.1 * still, "p": -0.5 * still, "h": h, "beta": 0 * still, "gamma": 0.3 * still}
-    near = pp.solve(LU, Motion.through(time, q, set="natural")).singularities["near"]
-    kinds = {(p["kind"], p["leg"]) for p in near}
-    assert {("CONSTRAINT_VANISHES", "1"), ("LEG_FRAME", "1"), ("LEG_FRAME", "3")} <= kinds
-    for passage in near:
-        assert passage["time"] == pytest.approx(0.5) or passage["kind"] == "ACTUATION"
-        assert passage["minimum"] < 0.01
-
-
-class Blind:
-    """A mechanism that has no state where it is asked for one."""
-
-    def __init__(self, mech):
-        self._mech = mech
-
-    def __getattr__(self, name):
-        return getattr(self._mech, name)
-
-    def state(self, *args, **kwargs):
-        state = self._mech.state(*args, **kwargs)
-        return replace(state, pose=np.full_like(state.pose, np.nan), twist=np.full_like(state.twist, np.nan))
-
-
-def test_a_change_of_sign_across_a_gap_is_told():
-    motion = yaw(lambda t: 1.2 + 0.6 * t, 11)
-    state = GOUGH.state(motion.coordinates, motion.rates)
-    det = GOUGH.determinant(state.pose, state.twist)
-    for array in (state.pose, det.determinant, det.rate):
-        array[5:8] = np.nan
-    findings = find_passages(Blind(GOUGH), motion, state.pose, det)
-    (crossing,) = findings["crossings"]
-    assert (crossing["kind"], crossing["found"], crossing["crosses"]) == ("UNKNOWN", False, True)
-    assert crossing["between"] == pytest.approx([0.4, 0.8])
-    assert "no singular pose is known" in warnings_of(findings)[0]
-
-
-def test_dependent_coordinates_follow_between_samples():
-    """The 3-RPS driven by z, rx, ry: findings do not depend on the samples."""
-    fine = np.linspace(0, 1, 201)
-    q = {"z": 0.25 - 0.24 * fine, "rx": 0.3 + 0.1 * fine, "ry": 0.9 * fine}
-    motion = Motion.through(fine, q, set="pose")
-    times = [
-        [c["time"] for c in pp.solve(RPS, motion.sample(np.linspace(0, 1, n))).singularities["crossings"]]
-        for n in (6, 41, 201)
-    ]
-    assert len(times[0]) >= 1
-    for others in times[1:]:
-        assert others == pytest.approx(times[0], abs=1e-7)
-
-
-def test_a_design_that_is_singular_everywhere_is_named_once():
-    angles = np.radians([10, 50, 130, 170, 250, 290])
-    ring = np.stack([np.cos(angles), np.sin(angles), 0 * angles], axis=1)
-    mech = hexapod(0.5 * ring, 0.3 * ring, (0.0, 0.0, 0.6))
-    n = 11
-    q = {name: np.zeros(n) for name in ("x", "y", "rx", "ry")} | {
-        "z": np.linspace(0.6, 0.7, n),
-        "rz": np.linspace(0, 0.2, n),
-    }
-    findings = pp.solve(mech, Motion.through(np.linspace(0, 1, n), q, set="pose")).singularities
-    assert (findings["uncontrolled"], findings["crossings"]) == (1, [])
-    assert "singular by design" in warnings_of(findings)[0]
-
-
-def test_findings_survive_files(tmp_path):
-    solution = pp.solve(GOUGH, yaw(lambda t: 1.2 + 0.6 * t, 8))
-    for name in ("a.nc", "a.csv"):
-        solution.save(tmp_path / name)
-        assert pp.load_solution(tmp_path / name).singularities == solution.singularities
-
-
-def test_solve_warns_by_name_and_time(tmp_path, run):
-    motion = tmp_path / "turn.csv"
-    rows = [[t, 0, 0, 600, 0, 0, np.degrees(1.2 + 0.6 * t)] for t in np.linspace(0, 1, 8)]
-    header = "time [s], x [mm], y [mm], z [mm], rx [deg], ry [deg], rz [deg]"
-    np.savetxt(motion, rows, fmt="%.17g", delimiter=",", header=header, comments="")
-    arguments = ["solve", DATA / "stewart-gough.toml", motion, "-o", tmp_path / "r.nc"]
-    words = " ".join(run(*arguments)[1].split())
-    assert "Warning: the motion crosses a singular pose at 0.617993878 s; direct singularity" in words
-    assert "Warning: the motion is near a singular pose from" in words
-    facts = json.loads(run(*arguments, "--json")[1])["singularities"]
-    assert facts["crossings"][0]["time"] == pytest.approx((np.pi / 2 - 1.2) / 0.6, abs=1e-9)
-    assert facts["near"][0]["kind"] == "ACTUATION"
-    assert len(facts["warnings"]) == 2
-
-
-# --- distance along coordinates -----------------------------------------------------------------------------
-
-
-def assert_first_zeros(mech: pp.Mechanism, name: str, pose: np.ndarray, found) -> int:
-    """Each value is a zero of the independent determinant, none is on the way; the number of zeros."""
-    values, count = dict(zip(found.coordinates, found.value, strict=True)), 0
-    for k, coordinate in enumerate(found.coordinates):
-        for side in range(2):
-            end, searched = found.singular[k, side], found.searched[k, side]
-            stop = end if np.isfinite(end) else searched
-            path = np.linspace(values[coordinate], stop, 400)
-            poses = np.empty((400, 4, 4))
-            guess = pose
-            for i, value in enumerate(path):
-                guess = poses[i] = mech.pose(values | {coordinate: value}, guess=guess)
-            known = np.isfinite(poses).all(axis=(1, 2))
-            assert known[:-1].all()
-            at = poses[known][:, :3, :3], poses[known][:, :3, 3]
-            det = np.linalg.det(independent_jacobian(name, at, mech.characteristic_length))
-            assert len({*np.sign(det[:-1])}) == 1, coordinate
-            if np.isfinite(end):
-                count += 1
-                assert abs(det[-1]) < 1e-9 * abs(det[0])
-                assert found.kind[k, side] != Kind.NONE
-                assert found.distance[k, side] == abs(end - values[coordinate])
-            else:
-                assert (found.kind[k, side], end) == (Kind.NONE, [-np.inf, np.inf][side])
-    return count
-
-
-def test_distance_of_a_hexapod_is_the_quarter_turn():
-    found = GOUGH.singularity_distance(GOUGH.home)
-    assert found.coordinates == ("x", "y", "z", "rx", "ry", "rz")
-    assert found.singular[5] == pytest.approx([-np.pi / 2, np.pi / 2], abs=1e-12)
-    assert found.kind[5].tolist() == [Kind.ACTUATION] * 2
-    assert assert_first_zeros(GOUGH, "stewart-gough", GOUGH.home, found) >= 6
-    # A full turn for angles; lengths as far as asked.
-    assert GOUGH.singularity_distance(GOUGH.home, reach=0.25).searched[0].tolist() == [-0.25, 0.25]
-    at = GOUGH.singularity_distance(GOUGH.pose(QUARTER))
-    assert at.distance.tolist() == np.zeros((6, 2)).tolist()
-
-
-def test_distance_in_natural_coordinates():
-    pose = LU.pose(NATURAL)
-    found = LU.singularity_distance(pose)
-    assert found.coordinates == ("alpha", "p", "h", "beta", "gamma")
-    assert assert_first_zeros(LU, "lu", pose, found) >= 5
-
-
-def test_distance_with_dependent_coordinates():
-    pose = RPS.pose({"z": 0.45, "rx": 0.1, "ry": -0.2})
-    found = RPS.singularity_distance(pose)
-    assert found.coordinates == ("z", "rx", "ry")
-    assert assert_first_zeros(RPS, "3-rps", pose, found) >= 2
-    named = RPS.singularity_distance(pose, coordinates=["rx", "ry", "z"])
-    assert np.array_equal(named.singular, found.singular)
-
-
-@pytest.mark.parametrize("turned", [0.3, 0.05])
-def test_distance_to_a_constraint_singularity(turned):
-    """Where the constraints are lost the dependent coordinates are, too; the kind is told all the same."""
-    angle = np.pi - turned
-    pose = matrix((o.turn([0.0, angle, 0.0]), np.array([-0.075 * (1 - np.cos(angle)), 0.0, 0.4])))
-    found = RPS.singularity_distance(pose, coordinates=["z", "rx", "ry"])
-    assert found.value[2] == pytest.approx(turned)
-    assert found.singular[2, 0] == pytest.approx(0.0, abs=1e-6)
-    assert found.kind[2, 0] == Kind.CONSTRAINT
-
-
-def test_distance_of_a_batch_and_without_answer():
-    poses = np.stack([LU.pose(NATURAL), np.full((4, 4), np.nan)])
-    found = LU.singularity_distance(poses)
-    assert found.status.tolist() == [Status.OK, Status.INVALID_INPUT]
-    assert found.singular.shape == (2, 5, 2)
-    assert np.array_equal(found.singular[0], LU.singularity_distance(poses[0]).singular)
-    assert np.isnan(found.singular[1]).all()
-    assert (found.kind[1] == Kind.UNKNOWN).all()
-    # At the fold the paper's coordinates do not tell the pose's neighbours.
-    assert LU.singularity_distance(LU.home, "paper").status == Status.FOLD

@@ -88,8 +88,8 @@ def draw(name, kinds, rng, variant=""):
     a plane; "gimbal" has the base joints' axes 0.03 rad from the legs.
     """
     planar = variant == "planar"
-    units = {kind: list(names)[rng.integers(len(names))] for kind, names in o._UNITS.items()}
-    per = {kind: 1 / o._UNITS[kind][unit] for kind, unit in units.items()}
+    units = {kind: list(names)[rng.integers(len(names))] for kind, names in o.UNITS.items()}
+    per = {kind: 1 / o.UNITS[kind][unit] for kind, unit in units.items()}
     home = rng.normal(size=3) * ([0, 0, 0.2] if planar else 0.2)
     position = np.array([0.03, -0.05, 0.0 if planar else 0.8]) + rng.uniform(-0.05, 0.05, 3) * (not planar)
     R = o.turn(home)
@@ -303,7 +303,7 @@ def case(name) -> Case:
     else:
         # The limit of every leg's stroke is its length at the second uniform pose, or that at home.
         at = o.lengths(spec, pose).x
-        per = o._UNITS["length"][tables["units"]["length"]]
+        per = o.UNITS["length"][tables["units"]["length"]]
         for i, leg in enumerate(tables["legs"]):
             ends = sorted([at[0, i], at[2, i]])
             leg["stroke"] = {"min": ends[0] / per, "max": ends[1] / per}
