@@ -148,7 +148,7 @@ def measure():
     say("redundant actuators")
     results["actuation"] = child("actuation", timeout=1800)
     say("import, list and build")
-    results["start"] = {"commands": start.commands(), "build": start.build()}
+    results["start"] = start.measured()
     say("workspaces")
     results["workspaces"] = workspaces(threads[-1])
     say("Rust")

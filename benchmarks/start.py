@@ -20,6 +20,11 @@ COMMANDS = {
 }
 
 
+def measured():
+    """All of it."""
+    return {"commands": commands(), "build": build()}
+
+
 def commands():
     """Seconds of whole processes, in turns."""
     found = {name: [] for name in COMMANDS}

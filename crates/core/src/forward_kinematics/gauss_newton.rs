@@ -224,7 +224,8 @@ impl<'a> Search<'a> {
         self.trial = Some(self.pose.stepped(&step_of(self.mech, at.step, self.share)));
     }
 
-    fn found(&self) -> FoundPose {
+    /// The result, with the largest error of a length or a constraint at its pose, m.
+    fn found(&self, residual: f64) -> FoundPose {
         let (mech, pose) = (self.mech, self.pose);
         let nothing = |status| FoundPose { pose, residual: f64::NAN, iterations: 0, sign: f64::NAN, status };
         if !are_coordinates(mech, self.lengths) {
@@ -239,8 +240,7 @@ impl<'a> Search<'a> {
             (false, false) => Status::NotConverged,
         };
         let sign = if mech.mobility.uncontrolled > 0 { 0.0 } else { 1.0 };
-        let asked: Vec<LegTarget<f64>> = asked_of_all(mech, self.lengths).collect();
-        FoundPose { pose, residual: error(mech, &asked, &pose), iterations: self.iterations, sign, status }
+        FoundPose { pose, residual, iterations: self.iterations, sign, status }
     }
 }
 
@@ -279,11 +279,16 @@ pub fn forward_kinematics_of(mech: &Mechanism, states: &[Guessed]) -> Vec<FoundP
             }
         }
     }
-    let alone = |(search, (lengths, guess)): (&Search, &Guessed)| {
+    for (k, search) in searches.iter().enumerate() {
+        put(&mut poses, k, &search.pose);
+    }
+    let mut residuals = [0.0; WIDTH];
+    lanes::dispatch(Residuals { mech, poses: &poses, numbers: &numbers, result: &mut residuals });
+    let alone = |((search, residual), (lengths, guess)): ((&Search, f64), &Guessed)| {
         let singular = search.dependent || mech.mobility.uncontrolled > 0;
-        if singular { by_singular_values(mech, lengths, guess) } else { search.found() }
+        if singular { by_singular_values(mech, lengths, guess) } else { search.found(residual) }
     };
-    searches.iter().zip(states).map(alone).collect()
+    searches.iter().zip(residuals).zip(states).map(alone).collect()
 }
 
 /// The same of one state for rows of any rank.
@@ -294,7 +299,7 @@ fn by_singular_values(mech: &Mechanism, lengths: &[f64], guess: &Pose<f64>) -> F
         errors.set(mech, &asked, &trial);
         search.judge(Misses::by_singular_values(mech, &trial, &errors));
     }
-    search.found()
+    search.found(error(mech, &asked, &search.pose))
 }
 
 /// What poses side by side miss.
@@ -314,9 +319,7 @@ impl Task for Evaluation<'_> {
         let mut asked = vec![LegTarget::none(); numbers.len()];
         for k in (0..WIDTH).step_by(V::WIDTH) {
             let pose = load(poses, k);
-            for ((asked, numbers), (_, leg)) in asked.iter_mut().zip(numbers).zip(mech.actuated()) {
-                *asked = LegTarget::of(leg, V::load(&numbers[k..]));
-            }
+            set_targets(mech, numbers, k, &mut asked);
             errors.set(mech, &asked, &pose);
             let found = Misses::by_reflections(mech, &pose, &errors, &mut rows);
             let numbers = [found.legs, found.others, found.merit, found.size, found.left, found.pivots];
@@ -329,6 +332,33 @@ impl Task for Evaluation<'_> {
                 result[k + lane] = Misses { legs, others, merit, step, size, left, pivots };
             }
         }
+    }
+}
+
+/// The largest errors of poses side by side, m.
+struct Residuals<'a> {
+    mech: &'a Mechanism,
+    poses: &'a Poses,
+    numbers: &'a [lanes::Row],
+    result: &'a mut lanes::Row,
+}
+
+impl Task for Residuals<'_> {
+    #[inline(always)]
+    fn run<V: Lanes>(self) {
+        let mut asked = vec![LegTarget::none(); self.numbers.len()];
+        for k in (0..WIDTH).step_by(V::WIDTH) {
+            set_targets(self.mech, self.numbers, k, &mut asked);
+            error::<V>(self.mech, &asked, &load(self.poses, k)).store(&mut self.result[k..]);
+        }
+    }
+}
+
+/// Targets of the legs of the states from the k-th on.
+#[inline(always)]
+fn set_targets<V: Lanes>(mech: &Mechanism, numbers: &[lanes::Row], k: usize, targets: &mut [LegTarget<V>]) {
+    for ((target, numbers), (_, leg)) in targets.iter_mut().zip(numbers).zip(mech.actuated()) {
+        *target = LegTarget::of(leg, V::load(&numbers[k..]));
     }
 }
 
