@@ -8,7 +8,7 @@ use crate::limits::margins::LegCache;
 use crate::model::limit::Limit;
 use crate::model::mechanism::{Constraint, Leg, Mechanism, Turning};
 use crate::model::status::Status;
-use crate::number::lanes::{self, Lanes, Row, Task, WIDTH, work};
+use crate::number::lanes::{self, Lanes, Row, Task, WIDTH};
 use crate::number::real::{Ordered, Real};
 use crate::spatial::{Mat3, Motion, Pose, Twist, Vec3};
 
@@ -84,20 +84,13 @@ pub(super) fn read_pose(mech: &Mechanism, poses: &[f64], i: usize) -> (Pose<f64>
 
 /// Whether every leg has a direction and a frame: no length of zero, no axis of a universal joint (or rod) along it.
 #[inline(always)]
-pub(super) fn with_legs<V: Lanes>(mech: &Mechanism, pose: &Pose<V>, codes: Codes<V>) -> Codes<V> {
-    V::apart(WithLegs { mech, pose, codes })
-}
-
-work! {
-    WithLegs<'a, V> { mech: &'a Mechanism, pose: &'a Pose<V>, codes: Codes<V> } -> Codes<V> {
-        let mut codes = codes;
-        for leg in &mech.legs {
-            let p = leg::position(leg, pose);
-            let normal = leg::normal(leg, pose, &p);
-            codes = with_leg(mech, leg, &p, normal.dot(normal), codes);
-        }
-        codes
+pub(super) fn with_legs<V: Lanes>(mech: &Mechanism, pose: &Pose<V>, mut codes: Codes<V>) -> Codes<V> {
+    for leg in &mech.legs {
+        let p = leg::position(leg, pose);
+        let normal = leg::normal(leg, pose, &p);
+        codes = with_leg(mech, leg, &p, normal.dot(normal), codes);
     }
+    codes
 }
 
 /// Whether one leg has a direction and a frame, from |N|² \[T5\], and the strut of a slider reaches its rail,
@@ -198,17 +191,6 @@ pub(super) fn with_twist<V: Lanes>(
 /// Whether pose, twist and acceleration keep the constraints, `g = ġ = g̈ = 0` \[T65\], with no leg backwards.
 #[inline(always)]
 pub(super) fn with_motion<V: Lanes>(mech: &Mechanism, platform: &Motion<V>, codes: Codes<V>) -> Codes<V> {
-    V::apart(WithMotion { mech, platform, codes })
-}
-
-work! {
-    WithMotion<'a, V> { mech: &'a Mechanism, platform: &'a Motion<V>, codes: Codes<V> } -> Codes<V> {
-        kept_by_motion(mech, platform, codes)
-    }
-}
-
-#[inline(always)]
-fn kept_by_motion<V: Lanes>(mech: &Mechanism, platform: &Motion<V>, codes: Codes<V>) -> Codes<V> {
     let Motion { pose, twist, acceleration } = platform;
     let second = Twist::new(acceleration.a, acceleration.eps);
     let (scale, speed) = (mech.characteristic_length, square(mech, twist));
@@ -242,25 +224,13 @@ pub(super) fn within_limits_of<V: Lanes>(
     mech: &Mechanism,
     pose: &Pose<V>,
     seen: &mut LegCache<V>,
-    codes: Codes<V>,
+    mut codes: Codes<V>,
 ) -> Codes<V> {
-    V::apart(WithinLimits { mech, pose, seen, codes })
-}
-
-work! {
-    WithinLimits<'a, V> {
-        mech: &'a Mechanism,
-        pose: &'a Pose<V>,
-        seen: &'a mut LegCache<V>,
-        codes: Codes<V>,
-    } -> Codes<V> {
-        let mut codes = codes;
-        for limit in joint_limits(mech) {
-            let margin = limit.bound.margin(limit.of_joint(mech, pose, seen));
-            codes = codes.unless(V::zero().at_most(margin), limit.status());
-        }
-        codes
+    for limit in joint_limits(mech) {
+        let margin = limit.bound.margin(limit.of_joint(mech, pose, seen));
+        codes = codes.unless(V::zero().at_most(margin), limit.status());
     }
+    codes
 }
 
 /// Status of one pose by the limits of joints, in the registers of batches: lengths at the very end of a

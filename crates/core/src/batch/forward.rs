@@ -155,9 +155,18 @@ impl Task for Checks<'_> {
         let (mech, mut k) = (self.mech, 0);
         while k < WIDTH {
             let pose = load::<V>(self.poses, k);
-            let legs = self.numbers.iter().zip(mech.actuated());
-            let asked: Vec<_> = legs.map(|(row, (_, leg))| LegTarget::of(leg, V::load(&row[k..]))).collect();
-            check(mech, &asked, &pose).store(&mut self.codes[k..]);
+            // At most six targets have their room here.
+            let (mut few, mut many) = ([LegTarget::none(); 6], vec![]);
+            let asked = if self.numbers.len() <= 6 {
+                &mut few[..self.numbers.len()]
+            } else {
+                many.resize(self.numbers.len(), LegTarget::none());
+                &mut many[..]
+            };
+            for ((target, row), (_, leg)) in asked.iter_mut().zip(self.numbers).zip(mech.actuated()) {
+                *target = LegTarget::of(leg, V::load(&row[k..]));
+            }
+            check(mech, asked, &pose).store(&mut self.codes[k..]);
             k += V::WIDTH;
         }
     }

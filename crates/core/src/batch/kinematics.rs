@@ -9,7 +9,7 @@ use super::{States, Table};
 use crate::kinematics::jacobian::MotionSolver;
 use crate::kinematics::leg;
 use crate::kinematics::passive_joints;
-use crate::kinematics::rows;
+use crate::kinematics::rows::for_each_row;
 use crate::limits::margins::LegCache;
 use crate::model::limit::Zero;
 use crate::model::mechanism::Mechanism;
@@ -65,9 +65,9 @@ impl Operation<1> for Jacobians<'_> {
     fn run<V: Lanes>(&self, at: At, answers: &mut Answers<'_, 1>) -> Codes<V> {
         let (pose, codes) = any_pose(self.poses, at);
         let [matrix] = Answers::fields();
-        for (k, row) in rows::of(self.mech).enumerate() {
+        for_each_row!(self.mech, |k, row| {
             answers.put(matrix, k, row.wrench(&pose).array());
-        }
+        });
         codes
     }
 }
@@ -88,12 +88,12 @@ impl Operation<1> for Hessians<'_> {
     fn run<V: Lanes>(&self, at: At, answers: &mut Answers<'_, 1>) -> Codes<V> {
         let (pose, codes) = any_pose(self.poses, at);
         let [layers] = Answers::fields();
-        for (k, row) in rows::of(self.mech).enumerate() {
+        for_each_row!(self.mech, |k, row| {
             let layer = row.hessian(&pose);
             for i in 0..6 {
                 answers.put(layers, 6 * k + i, layer[i]);
             }
-        }
+        });
         codes
     }
 }

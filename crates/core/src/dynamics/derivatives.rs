@@ -9,7 +9,7 @@ use crate::dynamics::force_balance::UnitForceResponse;
 use crate::dynamics::inverse_dynamics::{leg_wrench, load_in_base, own_wrench};
 use crate::kinematics::coordinate_sets::{self, ImplicitSensitivity, Set, Values, Variation, Varying};
 use crate::kinematics::leg;
-use crate::kinematics::rows::{self, Row, RowNumbers};
+use crate::kinematics::rows::{Row, RowNumbers, for_each_row};
 use crate::model::mechanism::{Leg, Mechanism};
 use crate::model::spec::Axes;
 use crate::number::lanes::{Lanes, Work, work};
@@ -136,9 +136,9 @@ pub(crate) fn by_motion<V: Lanes>(
         for i in 0..mech.legs.len() {
             imbalance.add_leg(mech, i, &varied, &mut row);
         }
-        for (other, number) in rows::others(mech).zip(at.numbers.others()) {
+        for_each_row!(others of mech, at.numbers.actuated().end, |number, other| {
             imbalance.add_row(other, number, &varied.pose);
-        }
+        });
         imbalance.put(&mut columns[direction * width..(direction + 1) * width]);
     }
 }

@@ -3,7 +3,7 @@
 
 use crate::kinematics::jacobian::scaled;
 use crate::kinematics::leg;
-use crate::kinematics::rows::{self, Matrix6};
+use crate::kinematics::rows::{Matrix6, for_each_row};
 use crate::model::mechanism::{Body, Leg, Mechanism, Rod};
 use crate::model::spec::Axes;
 use crate::number::real::{Constant, Real};
@@ -237,9 +237,9 @@ impl<T: Real> Balance<T> {
     /// The forces and multipliers, once all legs are there.
     #[inline(always)]
     pub fn solved<S: Constant<T>>(mut self, mech: &Mechanism<S>, pose: &Pose<T>) -> ([T; 6], T::Value) {
-        for (row, k) in rows::others(mech).zip(self.count..) {
+        for_each_row!(others of mech, self.count, |k, row| {
             self.rows[k] = row.wrench(pose).array();
-        }
+        });
         let w = self.wrench;
         let scaled_wrench = Wrench::new(w.force, w.torque * T::lit(1.0 / mech.characteristic_length));
         let mut rhs = scaled_wrench.array();

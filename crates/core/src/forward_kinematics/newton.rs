@@ -6,7 +6,7 @@
 use crate::kinematics::constraint;
 use crate::kinematics::idle;
 use crate::kinematics::leg;
-use crate::kinematics::rows::{self, Row};
+use crate::kinematics::rows::{Row, for_each_row};
 use crate::model::mechanism::{Leg, Mechanism};
 use crate::model::status::Status;
 use crate::number::real::{Ordered, Real};
@@ -95,7 +95,7 @@ pub struct System<T> {
 pub fn system<T: Real>(mech: &Mechanism, pose: &Pose<T>, asked: &[LegTarget<T>; 6]) -> System<T> {
     let scale = mech.characteristic_length;
     let mut system = System { residual: [T::zero(); 6], matrix: [[T::zero(); 6]; 6] };
-    for (k, row) in rows::of(mech).enumerate() {
+    for_each_row!(mech, |k, row| {
         let (value, row, unit) = match row {
             Row::Leg(leg) => {
                 let (e, r) = leg::vectors(leg, pose);
@@ -110,7 +110,7 @@ pub fn system<T: Real>(mech: &Mechanism, pose: &Pose<T>, asked: &[LegTarget<T>; 
             }
         };
         system.put(k, scale, value, row, unit);
-    }
+    });
     system
 }
 

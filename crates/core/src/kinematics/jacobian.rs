@@ -3,7 +3,7 @@
 
 use crate::kinematics::quadratic_forms::{Hessian, quadratic};
 use crate::kinematics::redundant_rows::RedundantRows;
-use crate::kinematics::rows::{self, Matrix6, RowNumbers};
+use crate::kinematics::rows::{self, Matrix6, RowNumbers, for_each_row};
 use crate::model::mechanism::Mechanism;
 use crate::number::lanes::Lanes;
 use crate::number::real::{Constant, Ordered, Real};
@@ -14,9 +14,9 @@ use crate::spatial::{Acceleration, Pose, Twist};
 #[inline(always)]
 pub fn jacobian<T: Real>(mech: &Mechanism<impl Constant<T>>, pose: &Pose<T>) -> Matrix6<T> {
     let mut matrix = [[T::zero(); 6]; 6];
-    for (k, row) in rows::of(mech).enumerate() {
+    for_each_row!(mech, |k, row| {
         matrix[k] = row.wrench(pose).array();
-    }
+    });
     matrix
 }
 
@@ -52,9 +52,9 @@ fn unscaled<T: Real>(mech: &Mechanism<impl Constant<T>>, mut x: [T; 6]) -> [T; 6
 #[inline(always)]
 pub fn hessian<T: Real>(mech: &Mechanism<impl Constant<T>>, pose: &Pose<T>) -> [Hessian<T>; 6] {
     let mut layers = [[[T::zero(); 6]; 6]; 6];
-    for (k, row) in rows::of(mech).enumerate() {
+    for_each_row!(mech, |k, row| {
         layers[k] = row.hessian(pose);
-    }
+    });
     layers
 }
 

@@ -35,6 +35,36 @@ pub fn others<S>(mech: &Mechanism<S>) -> impl Iterator<Item = Row<'_, S>> {
     mech.idle.iter().map(Row::Idle).chain(mech.independent.iter().map(Row::Constraint))
 }
 
+/// The same for kernels: a body for each row and its number, or for the rows after those of the legs, numbered from a given
+/// one on. A loop for each sort of row, inside which the compiler knows the sort; with the iterators it asks for it at
+/// each row.
+macro_rules! for_each_row {
+    ($mech:expr, |$k:ident, $row:ident| $body:block) => {{
+        let mut count = 0;
+        for (_, leg) in $mech.actuated() {
+            let ($k, $row) = (count, $crate::kinematics::rows::Row::Leg(leg));
+            $body
+            count += 1;
+        }
+        $crate::kinematics::rows::for_each_row!(others of $mech, count, |$k, $row| $body);
+    }};
+    (others of $mech:expr, $first:expr, |$k:ident, $row:ident| $body:block) => {{
+        let mut count = $first;
+        for idle in &$mech.idle {
+            let ($k, $row) = (count, $crate::kinematics::rows::Row::Idle(idle));
+            $body
+            count += 1;
+        }
+        for c in &$mech.independent {
+            let ($k, $row) = (count, $crate::kinematics::rows::Row::Constraint(c));
+            $body
+            count += 1;
+        }
+        let _ = count;
+    }};
+}
+pub(crate) use for_each_row;
+
 /// Numbers of the rows of each sort.
 #[derive(Clone, Copy, Debug)]
 pub struct RowNumbers {
@@ -149,9 +179,9 @@ pub(crate) fn constraint_row<T: Real>(c: &Constraint, pose: &Pose<T>, scale: f64
 #[inline(always)]
 pub fn pure_jacobian<T: Real>(mech: &Mechanism, pose: &Pose<T>, scale: f64) -> Matrix6<T> {
     let mut rows = [[T::zero(); 6]; 6];
-    for (k, row) in of(mech).enumerate() {
+    for_each_row!(mech, |k, row| {
         rows[k] = row.pure(pose, scale);
-    }
+    });
     rows
 }
 
@@ -165,9 +195,9 @@ fn idle_row<T: Real>(idle: &Idle, pose: &Pose<T>, scale: f64) -> [T; 6] {
 #[inline(always)]
 pub(crate) fn gram<T: Real>(mech: &Mechanism, pose: &Pose<T>, scale: f64) -> Matrix6<T> {
     let mut sum = [[T::zero(); 6]; 6];
-    for row in of(mech) {
+    for_each_row!(mech, |_k, row| {
         add_square(&mut sum, &row.pure(pose, scale));
-    }
+    });
     sum
 }
 
