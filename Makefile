@@ -55,6 +55,7 @@ test-rust: $(BUILT)
 lint: $(BUILT) ## formatting, style and types of both languages
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
+	$(BIN)/python tools/imports.py
 	$(BIN)/mypy
 	$(BIN)/python -m mypy.stubtest --mypy-config-file pyproject.toml polypod._core
 	cargo fmt --all --check
@@ -82,7 +83,7 @@ lock: $(DEPS) ## renew requirements.lock and Cargo.lock
 	cargo update
 
 clean: ## remove whatever these targets made
-	rm -rf $(VENV) build demo dist site target .hypothesis .mypy_cache .pytest_cache .ruff_cache
+	rm -rf $(VENV) build demo dist site target .mypy_cache .pytest_cache .ruff_cache
 	rm -f python/polypod/_core*.so python/polypod/_core*.pyd
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 

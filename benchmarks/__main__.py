@@ -30,7 +30,7 @@ LIMIT = 60
 
 
 def child(module, *arguments, timeout=600, **environment):
-    """What a module of this folder prints, run in a process of its own."""
+    """Output of a module of this folder, run in a process of its own."""
     done = subprocess.run(
         [sys.executable, "-m", f"benchmarks.{module}", *map(str, arguments)],
         cwd=ROOT,
@@ -48,7 +48,7 @@ def operations(what, threads, sizes, **environment):
 
 
 def instruction_sets():
-    """Times of the operations with each instruction set that the product can be told to use."""
+    """Times of the operations with each instruction set that the product can use."""
     rows = []
     for name in compute.instruction_sets():
         measured = operations("curve", 1, [COMPARED], POLYPOD_INSTRUCTIONS=name)
@@ -67,7 +67,7 @@ def workspaces(threads):
 
 
 def cargo(*command, then=()):
-    """What a cargo command prints that first builds on all cores, then runs on one."""
+    """Output of a cargo command that first builds on all cores, then runs on one."""
     build = ["cargo", "bench", "--no-run"] if command[0] == "bench" else ["cargo", "build"]
     target = ["--package", "polypod-bench", *command[1:]]
     subprocess.run([*build, *target], cwd=ROOT, check=True)
@@ -92,7 +92,7 @@ def rust():
 
 
 def machine():
-    """What it was measured on."""
+    """Machine on which it was measured."""
 
     def line(path, key):
         text = Path(path).read_text() if Path(path).exists() else ""
@@ -148,7 +148,7 @@ def measure():
     say("redundant actuators")
     results["actuation"] = child("actuation", timeout=1800)
     say("import, list and build")
-    results["start"] = {"commands": start.commands(), "build": start.build()}
+    results["start"] = start.measured()
     say("workspaces")
     results["workspaces"] = workspaces(threads[-1])
     say("Rust")

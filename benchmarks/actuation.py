@@ -1,7 +1,7 @@
-"""Machines with redundant actuators beside the same ones with just enough of them: time of a state of each operation.
+"""Machines with redundant actuators beside the same ones with just enough: time of a state of each operation.
 
-A redundant machine and its square twin, in which so many legs are passive that the others are just enough, take turns at
-the same states. Prints a line of JSON; run by `python -m benchmarks`.
+A redundant machine and its square twin, in which so many legs are passive that the others are just enough,
+take turns at the same states. Prints a line of JSON; run by `python -m benchmarks`.
 """
 
 import json

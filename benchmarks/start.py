@@ -1,4 +1,4 @@
-"""How long it takes to begin: the import, the list of built-in mechanisms, and the build of the extension from nothing."""
+"""How long it takes to begin: the import, the list of built-in mechanisms, and the build of the extension."""
 
 import os
 import subprocess
@@ -20,6 +20,11 @@ COMMANDS = {
 }
 
 
+def measured():
+    """All of it."""
+    return {"commands": commands(), "build": build()}
+
+
 def commands():
     """Seconds of whole processes, in turns."""
     found = {name: [] for name in COMMANDS}
@@ -37,7 +42,16 @@ def build():
     """Seconds of the extension's build from nothing, with all that it depends on but downloads."""
     subprocess.run(["cargo", "fetch", "--locked"], cwd=ROOT, check=True)
     with tempfile.TemporaryDirectory() as target:
-        command = ["cargo", "build", "--release", "--locked", "--package", "polypod-py", "--target-dir", target]
+        command = [
+            "cargo",
+            "build",
+            "--release",
+            "--locked",
+            "--package",
+            "polypod-py",
+            "--target-dir",
+            target,
+        ]
         seconds = _seconds(command, os.environ | {"PYO3_PYTHON": sys.executable})
     return {"what": "build of the extension", "seconds": seconds, "cores": os.cpu_count()}
 

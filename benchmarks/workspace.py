@@ -43,7 +43,7 @@ def voxels():
 
 
 def meshed():
-    """The same from Python with mesh, volume and error."""
+    """Workspace search from Python with mesh, volume and error."""
     found = pp.workspace(pp.load(NAME), step=STEP)
     return {f"workspace of {found.mask.size:,} voxels with mesh": None}
 

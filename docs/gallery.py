@@ -82,7 +82,7 @@ def mechanisms() -> Figure:
             ax = figure.add_axes((left, low + 0.05, 1 / 3, 0.44), projection="3d")
             plot_mechanism(mech, ax=ax, labels=False)
             legs = "+".join(dict.fromkeys(f"{mech.leg_letters.count(l)}{l}" for l in mech.leg_letters))
-            text = f"{name}: {legs}, {mech.dof} freedoms"
+            text = f"{name}: {legs}, {mech.dof} degrees of freedom"
             figure.text(left + 1 / 6, low + 0.02, text, ha="center")
     return figure
 

@@ -10,9 +10,9 @@ print(mech)
 for warning in mech.warnings:
     print("  note:", warning)
 
-# 2. Freedoms are counted from ranks. The paper's Eq. 1 has the same sum with another split.
+# 2. Degrees of freedom are counted from ranks. The paper's Eq. 1 has the same sum with another split.
 mobility = mech.mobility()
-print(f"{mobility.dof} freedoms, {mobility.redundant} redundant and {mobility.passive} passive")
+print(f"{mobility.dof} degrees of freedom, {mobility.redundant} redundant and {mobility.passive} passive")
 print("the paper says:", mobility.published)
 
 # 3. A pose from the paper's coordinates: gamma follows from Eq. 5, `branch` is the sign of its sine.

@@ -4,7 +4,7 @@ import numpy as np
 
 import polypod as pp
 
-# 1. A mechanism is a TOML text, usually a file. Each R joint's axis is square to its leg, here tangential.
+# 1. A mechanism is a TOML text, usually a file. Each R joint's axis is perpendicular to its leg: tangential.
 LEG = """
 [[legs]]
 stroke = {{ min = 420, max = 640 }}
@@ -36,7 +36,7 @@ try:
 except pp.MechanismError as error:
     print(error)
 
-# 3. Three freedoms: give any three numbers of the pose, the others follow. Arrays are a batch.
+# 3. Three degrees of freedom: give any three numbers of the pose, the others follow. Arrays are a batch.
 tilt = np.radians([0.0, 5.0, 10.0])
 state = mech.state({"z": 0.5, "rx": tilt, "ry": 0.0})
 print("o moves aside with the tilt:", (1e3 * state.coordinates["x"]).round(2), "mm")

@@ -47,7 +47,7 @@ assert np.allclose(acceleration, state.acceleration)
 print("active forces:", mech.inverse_dynamics(state.pose, twist, acceleration).forces.round(1), "N")
 print("left of the power balance:", mech.power(state.pose, twist, acceleration).residual, "W")
 
-# 5. A batch: conditioning over a grid of heights and turns. Leading axes stay as they are.
+# 5. A batch: conditioning over a grid of heights and rotations. Leading axes stay as they are.
 heights, turns = np.meshgrid(np.linspace(0.5, 0.7, 5), np.radians([-60, -30, 0, 30, 60]), indexing="ij")
 poses = mech.pose({"x": 0.0, "y": 0.0, "z": heights, "rx": 0.0, "ry": 0.0, "rz": turns})
 quality = mech.conditioning(poses).sigma_min

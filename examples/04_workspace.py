@@ -1,4 +1,4 @@
-"""Workspaces: where the platform can go, how far it can turn there, and what stops it."""
+"""Workspaces: where the platform can go, how far it can rotate there, and what stops it."""
 
 import numpy as np
 

@@ -25,7 +25,7 @@ for body in bodies:
     body["inertia"] = (1.2 * np.array(body["inertia"])).tolist()
 wrong = pp.Mechanism.from_dict(model)
 
-# 3. It starts beside the motion: 10 mm off along the rod, and turned about it by a degree.
+# 3. It starts beside the motion: 10 mm off along the rod, and rotated about it by a degree.
 first = mech.pose({name: values[0] for name, values in motion.coordinates.items()}, branch=motion.branch)
 beside = mech.coordinates(first, "natural")
 start = mech.pose({**beside, "p": beside["p"] + 0.01, "alpha": beside["alpha"] + np.radians(1)})

@@ -1,4 +1,4 @@
-"""What several test files need."""
+"""Fixtures of several test files."""
 
 from __future__ import annotations
 
@@ -11,11 +11,12 @@ import pytest
 
 import polypod as pp
 from polypod import cli
+from support import DATA, ROOT
 
 CHROMIUM = Path("/usr/bin/chromium")
 """Debian's package, which a test machine has or lacks; Playwright's own downloads are not used."""
 
-SCREENSHOTS = Path(__file__).parents[1] / "build" / "screenshots"
+SCREENSHOTS = ROOT / "build" / "screenshots"
 """Pictures of pages, kept to be looked at."""
 
 _QUIET = (
@@ -46,7 +47,7 @@ def run(request, monkeypatch, capsys):
 @pytest.fixture(scope="session")
 def tricept():
     """Makes a Tricept: three UPS legs around a passive UPF post of that name; no strokes."""
-    data = pp.load(Path(__file__).parent / "data" / "stewart-gough.toml").to_dict()
+    data = pp.load(DATA / "stewart-gough.toml").to_dict()
     data.pop("published", None)
     arms = [
         {
@@ -89,7 +90,7 @@ def browser(without_tool):
 
 @dataclass
 class Watched:
-    """What a page said and asked for while it was open."""
+    """Console messages and requests of a page while it was open."""
 
     errors: list[str] = field(default_factory=list)
     """Errors on the console, and exceptions that nothing caught."""

@@ -106,7 +106,7 @@ def _tree(text: str) -> Iterator[tuple[str, ...]]:
 
 
 def rooms_of(graph: Graph) -> Graph:
-    """The same between rooms: folders, or files that stand alone. The root's `__init__.py` is above all."""
+    """Imports between rooms: folders, or files that stand alone. The root's `__init__.py` is above all."""
     rooms: Graph = {}
     for file, imported in graph.items():
         rooms.setdefault(_room(file), set()).update(_room(other) for other in imported)

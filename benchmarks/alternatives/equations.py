@@ -178,7 +178,7 @@ def wrench(leg, gravity, R, o, v, omega, a, eps):
     second = dot(delta, a_b) + dot(v_b, delta1)
     delta2 = times(sub(sub(a_b, times(delta, second)), times(delta1, 2.0 * rate)), inverse)
 
-    # N = u×δ and its rates; u turns with the platform in the SPU legs.
+    # N = u×δ and its rates; u rotates with the platform in the SPU legs.
     if leg.on_rod > 0.0:
         u = leg.axis
         normal = cross(u, delta)
@@ -209,7 +209,7 @@ def wrench(leg, gravity, R, o, v, omega, a, eps):
     about = dot(moment, delta)
     conjugate = add(cross(moment, delta), times(cross(w, u), about))
     if leg.rod_inertia > 0.0:
-        # The rod turns with this leg [T7].
+        # The rod rotates with this leg [T7].
         rod_rate = dot(normal, delta1) * part
         rod_acceleration = dot(normal, delta2) * part - 2.0 * rod_rate * stretch
         conjugate = sub(conjugate, times(normal, leg.rod_inertia * rod_acceleration * part))

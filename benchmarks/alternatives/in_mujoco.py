@@ -48,7 +48,7 @@ class MuJoCo:
     def forward_dynamics(self):
         self.passes = 0
         found = np.array([self._state(*state) for state in self.joints])
-        # The free joint turns in the platform's own axes.
+        # The free joint rotates in the platform's own axes.
         found[:, 3:] = np.einsum("nij,nj->ni", self.turns, found[:, 3:])
         return (found,)
 

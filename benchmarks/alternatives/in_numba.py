@@ -158,7 +158,7 @@ def _inverse_dynamics(table, rest, poses, twists, accelerations, forces, multipl
 
 @loop
 def _forward_kinematics(table, rest, lengths, guesses, poses):
-    """Newton's method on (r·r - ℓ²)/2 and g, turns by the Cayley map [T25, T26]."""
+    """Newton's method on (r·r - ℓ²)/2 and g, rotations by the Cayley map [T25, T26]."""
     m, x = np.empty((6, 6)), np.empty(6)
     for i in range(len(lengths)):
         R, o = _pose(guesses, i)
@@ -186,6 +186,6 @@ def _forward_kinematics(table, rest, lengths, guesses, poses):
 
 @register_jitable
 def _cayley(w, column, part):
-    """A column of R after the turn by w."""
+    """A column of R after the rotation by w."""
     turn = cross(w, column)
     return add(column, times(add(turn, times(cross(w, turn), 0.5)), part))

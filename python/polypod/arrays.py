@@ -46,7 +46,7 @@ class Arguments:
         return [spread(a, shape + last) for a, last in pairs]
 
     def loaded(self, wrench: ArrayLike | None, wrench_axes: str, *values: ArrayLike) -> Loaded:
-        """The same, then what the core is told of the load."""
+        """The checked arguments, then the load as the core takes it."""
         check_wrench_axes(wrench_axes)
         if wrench is None or self._with_load is None:
             return (*self(*values), None, False)

@@ -1,4 +1,4 @@
-"""What batches run on: threads, and the instructions of the processor.
+"""Threads and processor instructions for batches.
 
 Answers depend on neither, bit by bit.
 """

@@ -1,4 +1,4 @@
-"""What Polypod raises when a call or a file is wrong. Numerical outcomes never raise: see `Status`."""
+"""Exceptions for wrong calls and files. Numerical outcomes never raise: see `Status`."""
 
 from __future__ import annotations
 

@@ -152,10 +152,10 @@ class Mechanism:
         return _from_parts, (self._data, self._text)
 
     def __repr__(self) -> str:
-        return f"<Mechanism {self.name}: {'+'.join(self.leg_letters)}, {self.dof} freedoms>"
+        return f"<Mechanism {self.name}: {'+'.join(self.leg_letters)}, {self.dof} degrees of freedom>"
 
     def _repr_html_(self) -> str:
-        """Drawing, freedoms, legs and warnings."""
+        """Drawing, degrees of freedom, legs and warnings."""
         file, home = self.to_dict(), self.inverse_kinematics(self.home).lengths
         legs = zip(
             self.leg_names, self.leg_letters, self.actuated, self.drives, home, self.stroke, strict=True
@@ -172,7 +172,7 @@ class Mechanism:
         ]
         headers = ("leg", "joints", "actuated", f"{word(self.drives)} at home", "stroke")
         sets = [(name, ", ".join(names)) for name, names in self.coordinate_sets.items()]
-        said = f"{'+'.join(self.leg_letters)}, {self.dof} freedoms"
+        said = f"{'+'.join(self.leg_letters)}, {self.dof} degrees of freedom"
         notes = [
             file.get("description", ""),
             file.get("source", ""),
@@ -190,12 +190,12 @@ class Mechanism:
 
     @property
     def dof(self) -> int:
-        """Freedoms of the platform at generic poses."""
+        """Degrees of freedom of the platform at generic poses."""
         return self._core.dof
 
     @property
     def n_rows(self) -> int:
-        """Rows of J: actuated legs, idle freedoms, constraints; above 6 where actuators are redundant."""
+        """Rows of J: actuated legs, local degrees of freedom, constraints; above 6 if redundant."""
         return self._core.rows
 
     @property
@@ -265,14 +265,14 @@ class Mechanism:
 
     @property
     def warnings(self) -> list[str]:
-        """What a user of this mechanism should know, in plain words."""
+        """Warnings for the user of this mechanism, in plain words."""
         mobility, notes = self.mobility(), []
         sigma = self.conditioning(self.home)
         if mobility.uncontrolled:
             notes.append(
                 "singular by design: with all actuators locked the platform keeps "
-                f"{mobility.uncontrolled} of its freedoms at every pose, so that forces and velocities are "
-                "not determined anywhere."
+                f"{mobility.uncontrolled} of its degrees of freedom at every pose, so that forces and "
+                "velocities are not determined anywhere."
             )
         elif self._loses_constraints:
             notes.append(
@@ -301,14 +301,14 @@ class Mechanism:
         if self.redundantly_actuated:
             driven = int(self.actuated.sum())
             notes.append(
-                f"redundant actuators: {driven} for {self.dof - len(mobility.idle)} freedoms. Their "
-                "forces are a choice, and only lengths that agree have a pose."
+                f"redundant actuators: {driven} for {self.dof - len(mobility.idle)} degrees of freedom. "
+                "Their forces are a choice, and only lengths that agree have a pose."
             )
-        notes += [f"idle: {idle}; nothing drives or holds it." for idle in mobility.idle]
+        notes += [f"local degree of freedom: {idle}; nothing drives or holds it." for idle in mobility.idle]
         if mobility.passive:
             notes.append(
                 f"legs {', '.join(mobility.passive_legs)} spin freely about their own line "
-                f"({mobility.passive} passive freedoms)."
+                f"({mobility.passive} passive degrees of freedom)."
             )
         return notes
 
@@ -319,7 +319,7 @@ class Mechanism:
         return kind in (SingularityKind.CONSTRAINT, SingularityKind.CONSTRAINT_VANISHES)
 
     def mobility(self) -> Mobility:
-        """Freedoms, joints, redundant constraints and passive freedoms from generic ranks [Eq. 1, T18]."""
+        """Degrees of freedom, joints and redundant constraints, from generic ranks [Eq. 1, T18]."""
         m = json.loads(self._core.mobility())
         names = self.leg_names
         graph, published = m["graph"], self._data.get("published")
@@ -362,7 +362,7 @@ class Mechanism:
         """Pose, and exact twist and acceleration from coordinate rates and second rates [Eq. 2, 5, T19-T23].
 
         Args:
-            coordinates: by name, m and rad; the names tell the set: see `coordinate_sets`.
+            coordinates: by name, m and rad; the names determine the set: see `coordinate_sets`.
             rates: by the same names, per second; zero where left out.
             second_rates: likewise.
             branch: the sign of sin(γ + γ_0) in the paper's coordinates, where Eq. 5 leaves two γ;
@@ -470,8 +470,8 @@ class Mechanism:
         V = (v, ω) at o in base axes, m/s and rad/s; the first three columns of a leg's row have no unit, the
         others are in m. For any pose (..., 4, 4), on the constraints or not.
 
-        Idle freedoms have rows (0, u) between those of legs and constraints, with the spin ω·u for a rate
-        [T70]. With redundant actuators J is (..., n_rows, 6) [T72].
+        Local degrees of freedom have rows (0, u) between those of legs and constraints, with the spin ω·u for
+        a rate [T70]. With redundant actuators J is (..., n_rows, 6) [T72].
         """
         (poses,) = POSE(pose)
         return self._core.jacobian(poses)["jacobian"]
@@ -480,8 +480,8 @@ class Mechanism:
         """(..., 6, 6, 6): H of `J A + Vᵀ H V = (ℓ'', 0)`, a symmetric layer for each row of J [Eq. 15-19].
 
         Twist and acceleration at o in base axes; a leg's layer is in 1/m, 1 and m for (v, v), (v, ω) and
-        (ω, ω). For any pose (..., 4, 4), on the constraints or not. Idle freedoms have layers of zeros; with
-        redundant actuators H is (..., n_rows, 6, 6).
+        (ω, ω). For any pose (..., 4, 4), on the constraints or not. Local degrees of freedom have layers of
+        zeros; with redundant actuators H is (..., n_rows, 6, 6).
         """
         (poses,) = POSE(pose)
         return self._core.hessian(poses)["hessian"]
@@ -506,8 +506,8 @@ class Mechanism:
             pose: (..., 4, 4).
             rates: of the legs, (..., n), m/s; those of passive legs are not read.
 
-        Idle freedoms do not spin. Rates of redundant actuators must agree to 1e-6 of their size; else the
-        status is INCONSISTENT and there is no twist [T73].
+        Local degrees of freedom do not spin. Rates of redundant actuators must agree to 1e-6 of their size;
+        else the status is INCONSISTENT and there is no twist [T73].
         """
         arrays = self._rates(pose, rates)
         return PlatformTwist(self, **self._core.platform_twist(*arrays))
@@ -522,7 +522,8 @@ class Mechanism:
             twist: (..., 6).
             accelerations: second rates of the legs, (..., n), m/s²; those of passive legs are not read.
 
-        Idle freedoms keep their spin; accelerations of redundant actuators must agree, as rates must.
+        Local degrees of freedom keep their spin; accelerations of redundant actuators must agree, as rates
+        must.
         """
         arrays = self._second_rates(pose, twist, accelerations)
         return PlatformAcceleration(self, **self._core.platform_acceleration(*arrays))
@@ -532,7 +533,7 @@ class Mechanism:
     def conditioning(self, pose: ArrayLike, *, length: float | None = None) -> Conditioning:
         """Singular values (...) of the leg Jacobian on the allowed twists at a pose (..., 4, 4) [T24].
 
-        Pure numbers. `length`, m, is what turns are counted with: an angle is an arc of that radius; by
+        Pure numbers. `length`, m, is what rotations are counted with: an angle is an arc of that radius; by
         default the `characteristic_length`.
         """
         (poses,) = POSE(pose)
@@ -549,7 +550,7 @@ class Mechanism:
         Args:
             pose: (..., 4, 4).
             twist: (..., 6); at rest by default.
-            length: what turns are counted with, m; `characteristic_length` by default.
+            length: what rotations are counted with, m; `characteristic_length` by default.
         """
         poses, twists = MOVING(pose, twist)
         return Determinant(self, **self._core.determinant(poses, twists, self._length(length)))
@@ -563,7 +564,7 @@ class Mechanism:
 
         Args:
             pose: (..., 4, 4).
-            length: what turns are counted with, m; `characteristic_length` by default.
+            length: what rotations are counted with, m; `characteristic_length` by default.
             tolerance: up to it a measure (a pure number) counts as zero; with `NEAR_SINGULAR`, 0.01, the kind
                 is that of a singularity nearby.
 
@@ -582,10 +583,10 @@ class Mechanism:
         return Singularity(self, **out | {name: codes(out[name]) for name in ("kind", "leg", "uncontrolled")})
 
     def freedom_screws(self, pose: ArrayLike) -> Screws:
-        """What the platform is free to do at a pose, as principal screws [T66].
+        """Degrees of freedom of the platform at a pose, as principal screws [T66].
 
-        Translations first, then turns with their slides, the least pitch first; axes at right angles, those
-        of the base where they can be. At a constraint singularity there are more than `dof`.
+        Translations first, then rotations with their slides, the least pitch first; axes at right angles,
+        those of the base where they can be. At a constraint singularity there are more than `dof`.
 
         Args:
             pose: (4, 4), one pose.
@@ -608,7 +609,7 @@ class Mechanism:
 
         >>> import polypod as pp
         >>> mech = pp.load("3-upu")
-        >>> mech.constraint_screws(mech.home).pitch  # couples: turns are held
+        >>> mech.constraint_screws(mech.home).pitch  # couples: rotations are held
         array([inf, inf, inf])
         """
         return self._screws(pose, self._core.constraint_screws)
@@ -635,7 +636,7 @@ class Mechanism:
             set: the coordinate set; `natural` by default, or `pose` for a mechanism without it.
             coordinates: of the set `pose`, the `dof` coordinates to give; by default those that determine the
                 others best at the centre pose.
-            length: what turns are counted with, m; `characteristic_length` by default.
+            length: what rotations are counted with, m; `characteristic_length` by default.
             reach: how far lengths are followed, m; by default the longest leg at the centre pose. Angles are
                 followed for a full turn.
 
@@ -679,7 +680,7 @@ class Mechanism:
         return set, named
 
     def _length(self, length: float | None) -> float:
-        """The length that turns are counted with."""
+        """The length that rotations are counted with."""
         return self.characteristic_length if length is None else _positive("length", length)
 
     # --- forward kinematics ------------------------------------------------------------------------------
@@ -703,10 +704,10 @@ class Mechanism:
         with an F joint would have to point backwards [T9]. Lengths that are negative or not finite give
         INVALID_INPUT.
 
-        Idle freedoms keep the spin of the guess [T71]. Lengths of redundant actuators must agree: the pose
-        has all of them, to 1e-6 of the characteristic length, or the status is INCONSISTENT and there is
-        none, only the `residual` of the nearest [T73]; MODE_JUMP is not told then. A design that is
-        singular at every pose has a curve of poses for the lengths that it can have at all: the status is
+        Local degrees of freedom keep the spin of the guess [T71]. Lengths of redundant actuators must agree:
+        the pose has all of them, to 1e-6 of the characteristic length, or the status is INCONSISTENT and
+        there is none, only the `residual` of the nearest [T73]; MODE_JUMP is not reported then. A design that
+        is singular at every pose has a curve of poses for the lengths that it can have at all: the status is
         SINGULAR with one of them, INCONSISTENT for lengths that it cannot have.
 
         >>> import polypod as pp
@@ -730,12 +731,12 @@ class Mechanism:
             lengths: (..., n), m; those of passive legs are not read.
 
         The first call for a mechanism finds all complex solutions for generic lengths, which takes some
-        tenths of a second. With an idle freedom a mode stands for all spins: its pose has the one that is
-        the shortest turn from home [T70]. Of redundant actuators all lengths are met; INCONSISTENT tells that
-        no pose has them all [T73].
+        tenths of a second. With a local degree of freedom a mode stands for all spins: its pose has the one
+        that is the shortest rotation from home [T70]. Of redundant actuators all lengths are met;
+        INCONSISTENT means that no pose has them all [T73].
 
         Raises:
-            UnsupportedError: singular by design, or several idle freedoms.
+            UnsupportedError: singular by design, or several local degrees of freedom.
 
         >>> import polypod as pp
         >>> mech = pp.load("lu-3spu-2rpu-r")
@@ -748,7 +749,7 @@ class Mechanism:
         if found is None:
             raise UnsupportedError(
                 f"{self.name}: assembly modes need a design that is not singular everywhere and has at most "
-                "one idle freedom; forward_kinematics finds a pose near a guess"
+                "one local degree of freedom; forward_kinematics finds a pose near a guess"
             )
         table, counts, status = found
         count = np.array(counts, dtype=np.int64)
@@ -954,7 +955,7 @@ class Mechanism:
             twist: (..., 6).
             acceleration: (..., 6).
             wrench: load on the platform at o, (..., 6), N and N m; the mechanism's own by default. In base
-                axes it is kept, in platform axes it turns with the pose.
+                axes it is kept, in platform axes it rotates with the pose.
             wrench_axes: the axes of `wrench`, "base" or "platform".
             set: the coordinate set; `natural` by default, or `pose` for a mechanism without it.
             coordinates: of the set `pose`, the `dof` coordinates to vary; by default those that determine the
@@ -1173,7 +1174,7 @@ def load(source: str | Path) -> Mechanism:
 
     >>> import polypod as pp
     >>> pp.load("lu-3spu-2rpu-r")
-    <Mechanism lu-3spu-2rpu-r: RPU+SPU+RPU+SPU+SPU, 5 freedoms>
+    <Mechanism lu-3spu-2rpu-r: RPU+SPU+RPU+SPU+SPU, 5 degrees of freedom>
 
     Raises:
         MechanismError: everything wrong with the file, each with its place.

@@ -43,7 +43,7 @@ def perpendiculars(axis: Array) -> tuple[Array, Array]:
 
 
 def turn_about(axis: Array, start: Array, end: Array) -> float:
-    """The angle, rad, by which a turn about a unit axis takes one direction to another."""
+    """The angle, rad, by which a rotation about a unit axis takes one direction to another."""
     across_start = start - axis * (axis @ start)
     return float(np.arctan2(cross(axis, start) @ end, across_start @ end))
 

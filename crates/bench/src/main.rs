@@ -1,5 +1,6 @@
-//! What the arithmetic of one state is, and how fast the processor is at it: the counts of each operation for the
-//! published manipulator and the peak rates of multiplications and additions, of divisions and of square roots, as JSON.
+//! Arithmetic of one state and peak rates of the processor: the counts of each operation for the published
+//! manipulator and the peak rates of multiplications and additions, of divisions and of square roots, as
+//! JSON.
 //!
 //! The kernels run with a number that counts. Comparisons, selections, signs and memory are free; a division and a
 //! square root count as one flop each, though they take longer. Checks of the input are not in it.
@@ -14,7 +15,7 @@ use std::time::Instant;
 
 use polypod_core::dynamics::forward_dynamics::forward_dynamics;
 use polypod_core::dynamics::inverse_dynamics::inverse_dynamics;
-use polypod_core::forward_kinematics::newton::{Asked, step_of, system};
+use polypod_core::forward_kinematics::newton::{LegTarget, step_of, system};
 use polypod_core::kinematics::jacobian::jacobian;
 use polypod_core::kinematics::leg;
 use polypod_core::model::mechanism::Mechanism;
@@ -127,7 +128,7 @@ fn counts(mech: &Mechanism, state: &Motion<f64>) -> serde_json::Value {
     let Motion { pose, twist, .. } = &platform;
     let load = Wrench::new(lift(mech.load.wrench.force), lift(mech.load.wrench.torque));
     let forces = [Counted(100.0); 6];
-    let asked = [Asked { place: Counted(0.0), square: Counted(0.5) }; 6];
+    let asked = [LegTarget { place: Counted(0.0), square: Counted(0.5) }; 6];
     json!({
         "inverse_kinematics": counts_of(|| for leg in &mech.legs { black_box(leg::position(leg, pose)); }),
         "jacobian": counts_of(|| jacobian(mech, pose)),

@@ -1,4 +1,5 @@
-//! What batches must not lose: blocks are faster than one state after the other, and no state allocates.
+//! Performance guarantees of batches: blocks are faster than one state after the other, and no state
+//! allocates.
 
 mod common;
 

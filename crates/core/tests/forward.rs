@@ -19,7 +19,7 @@ fn lengths(mech: &Mechanism, pose: &Pose<f64>) -> Vec<f64> {
     mech.actuated().map(|(_, l)| leg::position(l, pose).coordinate).collect()
 }
 
-/// o in metres and turns in radians: largest difference.
+/// o in metres and rotations in radians: largest difference.
 fn apart(a: &Pose<f64>, b: &Pose<f64>) -> f64 {
     (a.o - b.o).norm().max((a.rotation.transpose() * b.rotation).rotation_vector().norm())
 }
@@ -279,7 +279,7 @@ fn a_pose_with_a_leg_backwards_in_a_fixed_joint_is_none() {
             batch::singularities(&mech, &poses, 1.0, TOLERANCE),
             batch::coordinate_values(&mech, &Set::Pose, &poses),
         ] {
-            // What breaks a constraint is told first.
+            // A broken constraint is reported first.
             let third = if mech.independent.is_empty() { Status::Ok } else { Status::OffConstraint };
             let name = table.fields[0].name;
             assert_eq!(table.status, [Status::Ok, none, third], "{letters}: {name}");

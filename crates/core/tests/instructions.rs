@@ -1,4 +1,5 @@
-//! What instruction sets change. One test, in a process of its own: the choice is that of the whole process.
+//! Differences between instruction sets. One test, in a process of its own: the choice is that of the whole
+//! process.
 
 mod common;
 

@@ -5,7 +5,7 @@ mod common;
 
 use common::{mechanisms, moving, parts, states};
 use polypod_core::dynamics::inverse_dynamics;
-use polypod_core::dynamics::joint_reactions::{self, Given, Place};
+use polypod_core::dynamics::joint_reactions::{self, Given, JointFrame};
 use polypod_core::dynamics::self_stress;
 use polypod_core::kinematics::leg;
 use polypod_core::model::mechanism::{Body, Mechanism};
@@ -53,7 +53,7 @@ fn links(mech: &Mechanism, state: &Motion<f64>) -> Vec<(String, Link)> {
         let p = leg::position(leg, &pose);
         let mut axes = leg::frame(leg, &pose, &p).axes;
         if ["SPS", "PSS"].contains(&leg.letters().as_str()) {
-            // It does not spin, and its bodies are symmetric: any axes that turn with δ will do.
+            // It does not spin, and its bodies are symmetric: any axes that rotate with δ will do.
             axes = without_spin(axes, parts(p.delta));
         }
         let (foot, [first, second]) = (leg::foot(leg, &p), leg.links());
@@ -168,8 +168,9 @@ fn components_are_open_where_constraints_are_redundant() {
     assert!(redundant >= 12, "two mechanisms have redundant constraints: {redundant} joints");
 }
 
-/// Couples of universal joints in the first choice, and all reactions in the second, are square to the self-stress that the
-/// choices differ by; on the published manipulator the first has no couples at all where they are open.
+/// Couples of universal joints in the first choice, and all reactions in the second, are perpendicular to the
+/// self-stress that the choices differ by; on the published manipulator the first has no couples at all where
+/// they are open.
 #[test]
 fn choices_are_least_and_differ_in_open_components_only() {
     let mut different = 0;
@@ -269,7 +270,7 @@ fn kernels<T: Scalar>(mech: &Mechanism, state: &Motion<f64>, on_platform: &[Wren
     };
     let load = load(mech, state);
     let given = Given::of(mech, &platform, Wrench::new(lift(load.force), lift(load.torque)));
-    let places: Vec<Place<T>> = joint_reactions::places(mech, &platform.pose);
+    let places: Vec<JointFrame<T>> = joint_reactions::places(mech, &platform.pose);
     let tops: Vec<_> = on_platform.iter().map(|w| Wrench::new(lift(w.force), lift(w.torque))).collect();
     let all = joint_reactions::reactions(mech, &places, &given, &tops);
     let joints = joint_reactions::joints(mech);

@@ -55,7 +55,7 @@ fn the_rate_of_the_determinant_is_its_derivative() {
     }
 }
 
-/// What the legs and all constraints of a mechanism say of a twist, with the size of what they could say.
+/// Norms of the rates that a twist gives to all legs, and to all constraints.
 fn noticed(mech: &Mechanism, pose: &Pose<f64>, twist: &Twist<f64>) -> [f64; 2] {
     let legs = mech.actuated().map(|(_, leg)| leg::row(leg, &leg::position(leg, pose)).power(twist));
     let rows = mech.constraints.iter().map(|c| constraint::row(c, pose).power(twist));

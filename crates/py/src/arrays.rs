@@ -84,7 +84,8 @@ pub fn arrays<'py>(py: Python<'py>, table: Table, batch: &[usize]) -> PyResult<B
     arrays_but(py, table, batch, [], [])
 }
 
-/// The same, where these fields are marks (1 for true) and those are whole numbers (-1 where there is none).
+/// Arrays by name, with the fields `M` as booleans (1 for true) and the fields `W` as whole numbers (-1 where
+/// there is none).
 pub fn arrays_but<'py, const M: usize, const W: usize>(
     py: Python<'py>,
     table: Table,

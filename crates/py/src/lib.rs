@@ -19,7 +19,7 @@ use polypod_core::forward_kinematics::assembly_modes::{self, Start};
 use polypod_core::kinematics::coordinate_sets::Set;
 use polypod_core::mobility::screw_systems;
 use polypod_core::mobility::singularity::{Kind, Screw};
-use polypod_core::mobility::singularity_distance::Search;
+use polypod_core::mobility::singularity_distance::SingularitySearch;
 use polypod_core::model::limit::Limit;
 use polypod_core::model::mechanism::Mechanism;
 use polypod_core::model::spec::{Axes, Fault, Spec};
@@ -284,15 +284,15 @@ impl PyMechanism {
         arrays(py, table, &batch)
     }
 
-    /// Vector (a twist at o), axis, pitch and point of each principal screw of the freedoms at one pose; none where a leg has no
-    /// direction.
+    /// Vector (a twist at o), axis, pitch and point of each principal screw of the degrees of freedom at one
+    /// pose; none where a leg has no direction.
     fn freedom_screws(&self, poses: Array<'_>) -> PyResult<Option<Vec<ScrewRow>>> {
         let pose = one_pose(&poses)?;
         let found = screw_systems::freedoms(&self.0, &pose);
         Ok(found.map(|all| all.iter().map(|(twist, screw)| screw_row(twist.array(), screw)).collect()))
     }
 
-    /// The same of the wrench of every constraint.
+    /// Vector (a wrench at o), axis, pitch and point of every constraint at one pose.
     fn constraint_screws(&self, poses: Array<'_>) -> PyResult<Vec<ScrewRow>> {
         let pose = one_pose(&poses)?;
         let found = screw_systems::constraints(&self.0, &pose);
@@ -314,7 +314,7 @@ impl PyMechanism {
         let (set, poses) = (self.set(set)?, slice(&poses)?);
         let given = batch::searched_coordinates(&self.0, &set, names.as_deref());
         let searched = set.names().iter().zip(&given).filter(|(_, g)| **g).map(|(name, _)| *name).collect();
-        let search = Search { set, given, reach, scale: length };
+        let search = SingularitySearch { set, given, reach, scale: length };
         let table = py.detach(|| batch::nearest_singular(&self.0, poses, &search));
         Ok((searched, arrays(py, table, &batch)?))
     }

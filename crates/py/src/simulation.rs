@@ -4,7 +4,7 @@ use numpy::{PyArray1, PyArrayMethods};
 use polypod_core::batch::{SINGULAR_PIVOTS, pose_of};
 use polypod_core::dynamics::forward_dynamics::forward_dynamics;
 use polypod_core::dynamics::inverse_dynamics::load_in_base;
-use polypod_core::kinematics::chart::{Chart, Place};
+use polypod_core::kinematics::chart::{Chart, ChartPoint};
 use polypod_core::model::spec::Axes;
 use polypod_core::spatial::{Twist, Wrench};
 use pyo3::exceptions::PyValueError;
@@ -27,11 +27,13 @@ fn six(array: &[f64]) -> PyResult<[f64; 6]> {
 }
 
 impl PyChart {
-    /// Coordinates and rates as a place; none where the chart ends.
-    fn place(&self, y: &[f64]) -> PyResult<Option<Place>> {
+    /// Coordinates and rates as a point of the chart; none where it ends.
+    fn place(&self, y: &[f64]) -> PyResult<Option<ChartPoint>> {
         let d = self.chart.freedoms();
         if y.len() != 2 * d {
-            return Err(PyValueError::new_err("needs one coordinate and one rate for each freedom"));
+            return Err(PyValueError::new_err(
+                "needs one coordinate and one rate for each degree of freedom",
+            ));
         }
         Ok(self.chart.place(self.mech.get().core(), &y[..d], &y[d..]))
     }

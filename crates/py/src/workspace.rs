@@ -88,7 +88,7 @@ impl PyFlood {
         py.detach(|| team.install(|| flood.retry(mech)))
     }
 
-    /// Which nodes are reached, flat, z fastest.
+    /// Mask of the reached nodes, flat, z fastest.
     fn mask<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<bool>> {
         PyArray1::from_slice(py, &self.flood.mask)
     }

@@ -1,4 +1,4 @@
-"""What answers have in common: names and units for their arrays, datasets, and how they show themselves."""
+"""Base class of answers: names and units of their arrays, datasets, and display."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class Quantity(NamedTuple):
         return " or " in self.about.unit and self.about.dims in (("limit",), ("coordinate",))
 
     def at(self, index: int, unit: str) -> str:
-        """What stands at a place of the last dimension, whose label has that unit."""
+        """Values at an index of the last dimension, whose label has that unit."""
         values, flags = self.values[..., index], self.about.flags
         if flags is not None:
             return outcomes(values, flags)
@@ -81,7 +81,7 @@ class Answer:
     """
 
     mech: HasParts
-    """The mechanism that was asked."""
+    """The mechanism that computed the answer."""
 
     _variables: ClassVar[dict[str, str]]
     """Array → its quantity, a name of `polypod.answers.variables`."""
@@ -164,7 +164,7 @@ class Answer:
         return tuple(states)
 
     def _heading(self) -> tuple[str, str]:
-        """What it is, and of how many states with which outcomes."""
+        """Title, number of states and their outcomes."""
         title, said = f"{type(self).__name__} of {self.mech.name}", []
         if self.batch:
             product = " × ".join(map(str, self.batch))

@@ -19,16 +19,16 @@ from polypod.answers.answer import Answer, Array, Codes
 class InverseDynamicsDerivatives(Answer):
     """Exact derivatives of active forces and multipliers [T56, T57]; the last axis is what is varied.
 
-    By pose: m for a move of o, rad for a turn about axes of the base through o, whose components twist and
-    acceleration keep. On a mechanism with constraints only changes that keep them have a meaning: of pose,
-    twist and acceleration together. Those by coordinates keep them. Forces are in N (multipliers of kind D:
-    N m); each derivative is in that unit by the unit of what is varied.
+    By pose: m for a move of o, rad for a rotation about axes of the base through o, whose components twist
+    and acceleration keep. On a mechanism with constraints only changes that keep them have a meaning: of
+    pose, twist and acceleration together. Those by coordinates keep them. Forces are in N (multipliers of
+    kind D: N m); each derivative is in that unit by the unit of what is varied.
 
     By geometry the load, the home pose, and the coordinates with their rates and second rates are kept, and
     dependent coordinates follow. Where constraints are redundant (legs on one rod) the independent ones alone
     are used: the others are taken to stay compatible. One number changed by itself, such as one joint's point
     off the line of its rod, would lock or strain such a mechanism. There, and for the two axes of an F joint,
-    which must stay square, sums over changes that fit have a meaning, single columns none.
+    which must stay perpendicular, sums over changes that fit have a meaning, single columns none.
     """
 
     coordinates: tuple[str, ...]
@@ -74,7 +74,7 @@ class InverseDynamicsDerivatives(Answer):
     constraint_by_geometry: Array
     """(..., k, g)."""
     lengths_by_geometry: Array
-    """(..., n, g), of all legs, m/m and m; with six freedoms the pose is kept."""
+    """(..., n, g), of all legs, m/m and m; with six degrees of freedom the pose is kept."""
     status: Codes
     """(...): FOLD where the coordinates do not determine the motion: all other derivatives stand."""
 
@@ -100,7 +100,7 @@ class InverseDynamicsDerivatives(Answer):
     }
 
     def labels(self) -> dict[str, Sequence[str]]:
-        """What is varied."""
+        """Names of the variables of differentiation."""
         return {
             "coordinate": self.coordinates,
             "body_parameter": self.bodies,

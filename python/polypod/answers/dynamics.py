@@ -19,7 +19,7 @@ from polypod.answers.variables import COMPONENTS
 
 @dataclass(eq=False, repr=False)
 class InverseDynamics(Answer):
-    """What balances a motion [Eq. 43]."""
+    """Active forces and multipliers that balance a motion [Eq. 43]."""
 
     forces: Array
     """(..., n): active forces, N; zero for passive legs.
@@ -29,8 +29,8 @@ class InverseDynamics(Answer):
     constraint: Array
     """(..., k): multipliers of the independent constraints, N, of kind D N m; for the paper's machine f_c."""
     idle_torques: Array
-    """(..., idle freedoms): torques about their lines on the platform that the motion needs and no leg gives,
-    N m, such as a spindle's motor [T70]; in the order of `Mobility.idle`."""
+    """(..., local degrees of freedom): torques about their lines on the platform that the motion needs and no
+    leg gives, N m, such as a spindle's motor [T70]; in the order of `Mobility.idle`."""
     status: Codes
     """(...): `Status` of each state."""
 
@@ -44,7 +44,7 @@ class InverseDynamics(Answer):
 
 @dataclass(eq=False, repr=False)
 class ForwardDynamics(Answer):
-    """What forces do to the platform [T49]."""
+    """Acceleration of the platform for given forces [T49]."""
 
     acceleration: Array
     """(..., 6): a of o in m/s^2, ε in rad/s^2."""
@@ -138,7 +138,7 @@ class CoupledForces(Answer):
 
 @dataclass(eq=False, repr=False)
 class JointReactions(Answer):
-    """What joints do to links [T44-T48]; j joints: rods first, then each leg's from base to platform.
+    """Joint reactions [T44-T48]; j joints: rods first, then each leg's from base to platform.
 
     A reaction is the wrench (F, T), N and N m, of the link on the base's side on that on the platform's, with
     T about the joint's point. Joint axes: (n, δ, n×δ) of the leg; of a U joint (u, n, u×n), u its own axis;

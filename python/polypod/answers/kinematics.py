@@ -1,7 +1,7 @@
 """Answers of kinematics: states, legs at a pose, poses of leg lengths, motion of legs and joints; SI.
 
 The shapes are written with n legs, k rods, and `...` for the batch. Vectors are in base axes unless another
-frame is named. Every answer has a `Status` per state, knows the mechanism that was asked, and goes to xarray
+frame is named. Every answer has a `Status` per state, knows its mechanism, and goes to xarray
 by `to_xarray`.
 """
 
@@ -188,7 +188,7 @@ class Kinematics(Answer):
     platform_cone_angle: Array
     """(..., n): between leg and cone axis of the platform joint, rad."""
     rod_angle: Array
-    """(..., k): turn of each rod about its line, zero at home, rad."""
+    """(..., k): rotation of each rod about its line, zero at home, rad."""
     rod_omega: Array
     """(..., k, 3): angular velocity of the rods, rad/s [Eq. 36]."""
     rod_eps: Array

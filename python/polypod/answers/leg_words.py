@@ -15,7 +15,7 @@ def word(drives: Iterable[Drive]) -> str:
 
 
 def words(drives: Iterable[Drive]) -> str:
-    """The same of several: "leg lengths", "places", or "lengths and places"."""
+    """Plural of `word`: "leg lengths", "places", or "lengths and places"."""
     kinds = kinds_among(drives)
     return (
         kinds[0].coordinates_of_legs if len(kinds) == 1 else " and ".join(each.coordinates for each in kinds)

@@ -1,4 +1,4 @@
-"""Mobility: freedoms, redundant constraints and passive freedoms, and the topology graph [Eq. 1, T18]."""
+"""Mobility: degrees of freedom, redundant constraints, and the topology graph [Eq. 1, T18]."""
 
 from __future__ import annotations
 
@@ -34,19 +34,19 @@ class Published:
     """The accounting that the mechanism's publication gives, in the terms of Eq. 1."""
 
     dof: int
-    """Freedoms M."""
+    """Degrees of freedom M."""
     redundant: int
     """Redundant constraints ς."""
     passive: int
-    """Passive freedoms M_0."""
+    """Passive degrees of freedom M_0."""
 
 
 @dataclass(frozen=True)
 class IdleFreedom:
-    """A turn of the platform that no leg feels at any pose: the spin of a rod that all legs end on [T70]."""
+    """A local degree of freedom of the platform: the spin of a rod on which all legs end [T70]."""
 
     body: str
-    """What the line is fixed in: "platform" or "base"."""
+    """Body in which the line is fixed: "platform" or "base"."""
     point: tuple[float, float, float]
     """A point of the line in the axes of the body, m."""
     axis: tuple[float, float, float]
@@ -54,21 +54,21 @@ class IdleFreedom:
 
     def __str__(self) -> str:
         point, axis = (f"({', '.join(f'{x:.6g}' for x in v)})" for v in (self.point, self.axis))
-        return f"spin about the line through {point} m along {axis}, {self.body} axes, felt by no leg"
+        return f"spin about the line through {point} m along {axis}, {self.body} axes, which moves no leg"
 
 
 @dataclass(frozen=True)
 class Mobility:
-    """Freedoms of the mechanism from ranks at generic poses, in the terms of Eq. 1 [T18]."""
+    """Degrees of freedom of the mechanism from ranks at generic poses, in the terms of Eq. 1 [T18]."""
 
     dof: int
-    """Freedoms of the platform: M of Eq. 1."""
+    """Degrees of freedom of the platform: M of Eq. 1."""
     links: int
     """Number of links, base and platform among them: n_0 of Eq. 1."""
     joints: int
     """Number of joints: n_k of Eq. 1."""
     joint_freedoms: int
-    """Freedoms of all joints together: ΣM_i of Eq. 1."""
+    """Degrees of freedom of all joints together: ΣM_i of Eq. 1."""
     loops: int
     """Independent loops, n_k - n_0 + 1: each has six closure equations."""
     closure_rank: int
@@ -78,14 +78,14 @@ class Mobility:
     redundant_legs: tuple[str, ...]
     """The legs whose constraints they couple."""
     passive: int
-    """Freedoms that leave the platform where it is: M_0 of Eq. 1."""
+    """Degrees of freedom that leave the platform where it is: M_0 of Eq. 1."""
     passive_legs: tuple[str, ...]
     """The legs that spin freely about their own line."""
     uncontrolled: int
-    """Freedoms, idle ones apart, that remain at generic poses with all actuators locked: zero unless the
-    design is singular."""
+    """Degrees of freedom, local ones apart, that remain at generic poses with all actuators locked: zero
+    unless the design is singular."""
     idle: tuple[IdleFreedom, ...]
-    """Freedoms that no leg feels, by design [T70]."""
+    """Degrees of freedom that no leg feels, by design [T70]."""
     constraint_rows: tuple[tuple[str, str], ...]
     """Leg and kind (A-E) of every scalar constraint."""
     independent_rows: tuple[int, ...]
@@ -108,5 +108,7 @@ class Mobility:
             notes.append(f"legs {', '.join(self.passive_legs)} spin freely")
         notes += [f"idle: {idle}" for idle in self.idle]
         if self.uncontrolled:
-            notes.append(f"{self.uncontrolled} freedoms remain with all actuators locked, at every pose")
-        return card("Mobility", f"{self.dof} freedoms", [rows_of(("", ""), rows)], notes=notes)
+            notes.append(
+                f"{self.uncontrolled} degrees of freedom remain with all actuators locked, at every pose"
+            )
+        return card("Mobility", f"{self.dof} degrees of freedom", [rows_of(("", ""), rows)], notes=notes)

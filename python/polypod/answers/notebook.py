@@ -38,7 +38,7 @@ src="data:image/png;base64,{{ picture }}">
 Shown = TypeVar("Shown")
 
 _DRAWN_BY: dict[type, Callable[[Any], bytes]] = {}
-"""What draws the picture on a card, by the type of what the card shows."""
+"""Functions that draw the picture of a card, by the type of its content."""
 
 
 def draw_with(kind: type[Shown], draw: Callable[[Shown], bytes]) -> None:

@@ -35,4 +35,4 @@ class Limit:
     greatest: float
     """inf where it has no upper bound."""
     scale: float
-    """What relative slack is measured by."""
+    """Scale of the relative slack."""

@@ -19,12 +19,13 @@ class Screws:
     """Screws at a pose, base axes [T66]; none where the status is not OK."""
 
     vector: Array
-    """(k, 6): twists (v, ω) of o, of a turn of one radian, or of a translation of one metre; or wrenches
+    """(k, 6): twists (v, ω) of o, of a rotation of one radian, or of a translation of one metre; or wrenches
     (F, T) at o, of a force of 1 N, or of a couple of 1 N m."""
     axis: Array
     """(k, 3): unit directions; NaN for a constraint that vanishes."""
     pitch: Array
-    """(k,): slide by turn, m/rad, infinite for a translation; torque by force, m, infinite for a couple."""
+    """(k,): slide per rotation, m/rad, infinite for a translation; torque by force, m, infinite for a
+    couple."""
     point: Array
     """(k, 3): the point of the axis that is nearest to o, m; o itself where the pitch is infinite."""
     status: int

@@ -1,4 +1,4 @@
-"""What is found of singularities at poses."""
+"""Answers of singularity analysis at poses."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ NEAR_SINGULAR = 0.01
 
 @dataclass(eq=False, repr=False)
 class Singularity(Answer):
-    """How near poses are to singularities, and to which kind [T24, T30-T33]; base axes.
+    """Distance of poses from singularity, and its kind [T24, T30-T33]; base axes.
 
-    Where a leg has no direction (LEG_LENGTH), or a slider's strut is square to its rail (STRUT_ACROSS_RAIL),
-    the status is SINGULAR, and only the kind, its leg, and the measures of legs and constraints stand.
-    Elsewhere singular poses have the status OK: the question has its answer.
+    Where a leg has no direction (LEG_LENGTH), or a slider's strut is perpendicular to its rail
+    (STRUT_ACROSS_RAIL), the status is SINGULAR, and only the kind, its leg, and the measures of legs and
+    constraints stand. Elsewhere singular poses have the status OK: the question has its answer.
     """
 
     determinant: Array
@@ -54,7 +54,7 @@ class Singularity(Answer):
     leg: Kinds
     """(...): index of the leg that the kind speaks of; -1 where it speaks of none."""
     uncontrolled: Kinds
-    """(...): freedoms that the locked actuators leave; -1 where not known."""
+    """(...): degrees of freedom that the locked actuators leave; -1 where not known."""
     twist: Array
     """(..., 6): the allowed twist at o that the legs notice least, m/s and rad/s.
 
@@ -64,7 +64,7 @@ class Singularity(Answer):
     axis: Array
     """(..., 3): direction of that twist's axis; of its translation where the pitch is infinite."""
     pitch: Array
-    """(...): slide by turn, m/rad; inf for a pure translation."""
+    """(...): slide per rotation, m/rad; inf for a pure translation."""
     point: Array
     """(..., 3): the axis's point nearest to o, m; o for a pure translation."""
     status: Codes
@@ -110,7 +110,7 @@ class Determinant(Answer):
 
 @dataclass(eq=False, repr=False)
 class SingularityDistance(Answer):
-    """How far each coordinate goes, the others kept, until det J is zero [T34]; m and rad."""
+    """Distance from singularity along each coordinate, the others kept: until det J = 0 [T34]; m and rad."""
 
     coordinates: tuple[str, ...]
     """Names of the k coordinates."""

@@ -8,7 +8,7 @@ from polypod import _core
 
 
 class SingularityKind(IntEnum):
-    """What is singular about a pose: the first of these conditions that holds [T32]."""
+    """Kind of a singularity: the first of these conditions that holds [T32]."""
 
     UNKNOWN = -1
     """There is no answer: `status` says why."""
@@ -18,19 +18,19 @@ class SingularityKind(IntEnum):
     CONSTRAINT_VANISHES = 2
     """The wrench of a constraint vanishes, as where L ∥ l and r ∥ L: the paper's first."""
     CONSTRAINT = 3
-    """The constraint wrenches depend on one another: a freedom more, that no actuator controls."""
+    """The constraint wrenches depend on one another: a degree of freedom more, that no actuator controls."""
     LEG_FRAME = 4
-    """A leg lies along the axis of its universal joint or rod: its turning about itself is undetermined."""
+    """A leg lies along the axis of its universal joint or rod: its rotation about itself is undetermined."""
     ACTUATION = 5
     """With all actuators locked the platform can still move: a direct singularity."""
     DEPENDENT_ROWS = 6
     """Only the constraints that J holds depend on one another: J is singular, the mechanism is not."""
     STRUT_ACROSS_RAIL = 7
-    """The strut of a slider is square to its rail, where two branches meet: an inverse singularity."""
+    """The strut of a slider is perpendicular to its rail, where two branches meet: an inverse singularity."""
 
     @property
     def message(self) -> str:
-        """What it means."""
+        """Meaning of the kind."""
         return _MESSAGES.get(self, "no answer; the status says why")
 
 

@@ -12,7 +12,7 @@ from polypod import _core
 
 
 class Status(IntEnum):
-    """What became of a state. A batch never raises for it; results hold NaN where there is no answer."""
+    """Outcome of a state. A batch never raises for it; results hold NaN where there is no answer."""
 
     OK = 0
     NO_BRANCH = 1
@@ -45,7 +45,7 @@ class Status(IntEnum):
 
     @property
     def message(self) -> str:
-        """What it means and what helps."""
+        """Meaning of the status, and a remedy."""
         return _MESSAGES[self]
 
 

@@ -1,4 +1,4 @@
-"""What every quantity is called, in which unit, along which dimensions: the one place for all datasets.
+"""Name, unit and dimensions of every quantity: the one definition for all datasets.
 
 The dimensions stand without those of the states (time, or the batch), which come first.
 """
@@ -32,7 +32,7 @@ _MODE, _COORDINATE, _SIDES = ("mode",), ("coordinate",), ("coordinate", "side")
 
 
 class HasParts(Protocol):
-    """What answers need of a mechanism: the names of its parts."""
+    """Interface that answers need of a mechanism: the names of its parts."""
 
     name: str
     leg_names: tuple[str, ...]
@@ -55,7 +55,7 @@ class HasParts(Protocol):
         """All limits that the file sets."""
 
     def mobility(self) -> Mobility:
-        """Freedoms, constraints and the topology graph."""
+        """Degrees of freedom, constraints and the topology graph."""
 
 
 class Variable(NamedTuple):
@@ -67,7 +67,7 @@ class Variable(NamedTuple):
     symbol: str
     long_name: str
     flags: type[IntEnum] | None = None
-    """What its numbers stand for, if they are codes."""
+    """Meanings of its numbers, if they are codes."""
 
     @property
     def attributes(self) -> dict[str, Any]:
@@ -118,13 +118,13 @@ VARIABLES = _variables(
         "platform_joint_rate": (_PAIR, "rad/s", "φ'", "rates of the platform joint"),
         "base_cone_angle": (_LEG, "rad", "", "angle between leg and cone axis of the base joint"),
         "platform_cone_angle": (_LEG, "rad", "", "angle between leg and cone axis of the platform joint"),
-        "rod_angle": (_ROD, "rad", "", "turn of the rod about its line since home"),
+        "rod_angle": (_ROD, "rad", "", "rotation of the rod about its line since home"),
         "rod_omega": (_ROD3, "rad/s", "ω_L", "angular velocity of the rod"),
         "rod_eps": (_ROD3, "rad/s^2", "ε_L", "angular acceleration of the rod"),
         "wrench": (_SIX, "N and N m", "(F_o, T_o)", "load on the platform at o, in its own axes"),
         "force": (_LEG, "N", "f_a", "active force of the leg"),
         "constraint": (_ROW, "N or N m", "f_c", "multiplier of the constraint"),
-        "idle_torque": (("idle",), "N m", "", "torque about the line of an idle freedom that no leg gives"),
+        "idle_torque": (("idle",), "N m", "", "torque about the line of a local degree of freedom"),
         "coupled_force": (("coupled_leg",), "N", "f_c1, f_c3", "couple-constrained force"),
         "coupled_torque": (_ONE, "N m", "T_c", "couple-constrained torque on the rod"),
         "coupled_force_as_printed": (("coupled_leg",), "N", "f_c1, f_c3", "the same, Eq. 44 as printed"),
@@ -180,10 +180,10 @@ FURTHER = _variables(
         "transmission": (_LEG, "1", "", "cosine between strut and prismatic joint; 1 for a telescopic leg"),
         "singularity_kind": (_ONE, "", "", "kind of the singularity", SingularityKind),
         "singular_leg": (_ONE, "1", "", "index of the leg that the kind speaks of; -1 for none"),
-        "uncontrolled": (_ONE, "1", "", "freedoms that locked actuators leave; -1 where not known"),
+        "uncontrolled": (_ONE, "1", "", "degrees of freedom that locked actuators leave; -1 where not known"),
         "uncontrolled_twist": (_SIX, "m/s and rad/s", "", "allowed twist that the legs notice least"),
         "screw_axis": (_AXIS, "1", "", "direction of that twist's axis"),
-        "screw_pitch": (_ONE, "m/rad", "", "slide by turn; inf for a translation"),
+        "screw_pitch": (_ONE, "m/rad", "", "slide per rotation; inf for a translation"),
         "screw_point": (_AXIS, "m", "", "point of the axis nearest to o, from o"),
         "within_limits": (_ONE, "1", "", "whether no limit is passed"),
         "coordinate_value": (_COORDINATE, "m or rad", "", "coordinate at the pose"),

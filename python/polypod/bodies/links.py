@@ -59,7 +59,8 @@ class LinkFrames(NamedTuple):
     frames: Array
     """(..., l, 4, 4): the link's axes and origin in base axes, m; NaN where a link has no place."""
     turn_known: NDArray[np.bool_]
-    """(..., l): False where the core does not tell the link's turn about its own line; any one stands then.
+    """(..., l): False where the core does not tell the link's rotation about its own line; any one stands
+    then.
 
     So at poses where balance determines no reactions, and where a leg lies along its universal joint's axis.
     """
@@ -87,7 +88,7 @@ def link_frames(mech: Mechanism, pose: ArrayLike) -> LinkFrames:
 
 
 class LinkPlaces:
-    """What `link_frames` tells, for those who ask again and again."""
+    """Frames of `link_frames`, computed once and kept."""
 
     def __init__(self, mech: Mechanism) -> None:
         self._mech, geometry = mech, mech.geometry
@@ -309,7 +310,7 @@ class _Shapes:
 
 
 def leg_radii(mech: Mechanism) -> list[float]:
-    """What the struts are drawn with, m."""
+    """Radii with which the struts are drawn, m."""
     return [leg["radius"] or RADIUS * mech.characteristic_length for leg in mech.geometry["legs"]]
 
 

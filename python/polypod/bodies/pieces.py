@@ -28,7 +28,7 @@ class Piece:
 
 
 def on_leg(joint: Mapping[str, Any], radius: float, at: ArrayLike = (0.0, 0.0, 0.0)) -> list[Piece]:
-    """What a joint has on the leg: the ball, or the pin along n."""
+    """Solid of a joint on the leg: the ball, or the pin along n."""
     match joint["joint"]:
         case "S":
             return [Piece("ball", JOINT, ball(at, 1.45 * radius))]

@@ -30,7 +30,7 @@ class Rail(NamedTuple):
     """(2, 3): on the line of the joints, where a carriage at the end of its way has its joint, m."""
     axis: Array
     back: Array
-    """Unit vector square to the axis, from the joint to the rail."""
+    """Unit vector perpendicular to the axis, from the joint to the rail."""
     radius: float
     """Of the strut, m."""
 
@@ -40,7 +40,7 @@ class Rail(NamedTuple):
         return np.asarray(self.ends + beyond + GAP * self.radius * self.back)
 
     def bar(self) -> Trimesh:
-        """What the carriage slides on."""
+        """Solid of the rail."""
         start, end = self.bar_ends()
         return beam(start, end, 1.1 * self.radius, self.back)
 
@@ -67,7 +67,7 @@ def lower_ends(ways: Sequence[Array], down: Array) -> Array:
 
 
 def behind(axis: Array, away: Array) -> Array:
-    """Unit vector square to a rail, as near to `away` as can be."""
+    """Unit vector perpendicular to a rail, as near to `away` as can be."""
     square = away - axis * (axis @ away)
     size = np.linalg.norm(square)
     return perpendiculars(axis)[0] if size <= 1e-9 * np.linalg.norm(away) else np.asarray(square / size)

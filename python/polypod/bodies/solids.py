@@ -62,7 +62,7 @@ def lathe(
     sides: int = SIDES,
     closed: bool = False,
 ) -> Trimesh:
-    """What a profile sweeps in a turn about an axis.
+    """Solid of revolution of a profile about an axis.
 
     Args:
         profile: (k, 2): distances from the axis, and along it from `start`, m. It begins and ends on the
@@ -118,7 +118,7 @@ def block(center: ArrayLike, axis: ArrayLike, size: float) -> Trimesh:
 
 
 def beam(start: ArrayLike, end: ArrayLike, width: float, side: ArrayLike) -> Trimesh:
-    """A square bar, a face of which looks along the unit vector `side`, square to the bar."""
+    """A square bar, a face of which looks along the unit vector `side`, perpendicular to the bar."""
     start, side = np.asarray(start, float), np.asarray(side, float)
     along = np.asarray(end, float) - start
     length = float(np.linalg.norm(along))

@@ -52,8 +52,8 @@ def export(
             "-o",
             "--output",
             metavar="FILE",
-            help="The file; it is overwritten. Its suffix tells the format: .xml (MJCF), .sdf, .urdf, .glb, "
-            ".stl, .csv, .nc, .mat. Meshes and the loop closures of a URDF are written beside it.",
+            help="The file; it is overwritten. Its suffix determines the format: .xml (MJCF), .sdf, .urdf, "
+            ".glb, .stl, .csv, .nc, .mat. Meshes and the loop closures of a URDF are written beside it.",
         ),
     ],
     motion: Annotated[

@@ -33,7 +33,7 @@ def info(
         typer.Option(metavar="FILE", help="Draw the mechanism at its centre pose into a .png or .svg file."),
     ] = None,
 ) -> None:
-    """Tell what a mechanism is: freedoms, joints, constraints, coordinates, conditioning, warnings."""
+    """Show a mechanism: degrees of freedom, joints, constraints, coordinates, conditioning, warnings."""
     from polypod.mechanism import load
     from polypod.summary.mechanism_facts import describe
 

@@ -12,7 +12,7 @@ app = typer.Typer()
 
 @app.command("list", epilog="Example: [bold]polypod list[/bold]")
 def list_(as_json: JsonOption = False) -> None:
-    """List the built-in mechanisms, a line each; `polypod info NAME` tells more."""
+    """List the built-in mechanisms, a line each; `polypod info NAME` shows more."""
     from polypod.summary.mechanism_facts import catalogue
 
     facts = catalogue()
@@ -21,6 +21,8 @@ def list_(as_json: JsonOption = False) -> None:
         return
     names, legs = (max(len(mechanism[key]) for mechanism in facts) for key in ("name", "legs"))
     for mechanism in facts:
-        words = f"{mechanism['legs']:{legs}}  {mechanism['dof']} freedoms  {mechanism['description']}"
+        words = (
+            f"{mechanism['legs']:{legs}}  {mechanism['dof']} degrees of freedom  {mechanism['description']}"
+        )
         # A line each, however narrow the terminal: for eyes and for grep.
         console().print(f"[bold]{mechanism['name']:{names}}[/bold]  {escape(words)}", soft_wrap=True)

@@ -45,7 +45,7 @@ def _parted(place: str, text: str, example: str) -> tuple[float, str]:
 
 
 def kind_of(option: str, name: str) -> str | None:
-    """What a coordinate is: "length", "angle", or None for a pure number.
+    """Kind of a coordinate: "length", "angle", or None for a pure number.
 
     Raises WorkspaceError for a name that is no coordinate of any mechanism.
     """

@@ -70,5 +70,5 @@ def report(
 
 
 def _command_line() -> str:
-    """What was typed, so that it can be typed again."""
+    """The command line, for reproduction."""
     return shlex.join(["polypod", *sys.argv[1:]])

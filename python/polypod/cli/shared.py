@@ -1,4 +1,4 @@
-"""What the commands share: arguments, console, tables, number formats, JSON, signs of progress."""
+"""Common parts of the commands: arguments, console, tables, number formats, JSON, progress."""
 
 from __future__ import annotations
 

@@ -26,7 +26,7 @@ app = typer.Typer()
 
 
 class Kind(StrEnum):
-    """What `polypod workspace` finds."""
+    """Kinds of result of `polypod workspace`."""
 
     REACHABLE = "reachable"
     SLICE = "slice"

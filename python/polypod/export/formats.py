@@ -37,7 +37,7 @@ RATE = 60
 
 @dataclass(frozen=True)
 class Format:
-    """What a format can be asked for."""
+    """Capabilities of an export format."""
 
     suffixes: tuple[str, ...]
     motion: Literal["none", "optional", "required"]
@@ -59,7 +59,7 @@ FORMATS: Mapping[str, Format] = {
 
 @dataclass(frozen=True)
 class Exported:
-    """What `export` wrote."""
+    """Result of `export`."""
 
     files: tuple[Path, ...]
     """The file asked for first, then those beside it."""
@@ -83,7 +83,7 @@ def export(
 
     Args:
         mech: the mechanism.
-        path: the file; its suffix tells the format.
+        path: the file; its suffix determines the format.
         to: a format of `FORMATS`, whatever the suffix.
         motion: what `glb` animates, 60 frames for each second, and what `csv`, `netcdf` and `mat` are the
             results of: a motion, or a solution for the last three.

@@ -1,7 +1,7 @@
 """A mechanism as a GLB scene (glTF 2.0): a node for each link, and its motion as an animation.
 
-glTF is right-handed with y up and in metres, Polypod has z up: the root's node turns by -90 degrees about x,
-so that base axes stand under it as they are.
+glTF is right-handed with y up and in metres, Polypod has z up: the root's node rotates by -90 degrees about
+x, so that base axes stand under it as they are.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from polypod.vectors import inverse
 Array = NDArray[np.float64]
 
 STILL = 1e-9
-"""What changes by no more over a motion, m or a pure number, has no channel."""
+"""Largest change over a motion, m or a pure number, that needs no channel."""
 SHARP = np.radians(40.0)
 """Edges with more between their faces stay edges when shaded."""
 FLOAT = 5126
@@ -68,7 +68,9 @@ def glb(mech: Mechanism, poses: Array, time: Array | None = None) -> tuple[bytes
     known = np.atleast_1d(found.turn_known[placed].all(axis=0))
     free = [link.name for link, turns in zip(links, known, strict=True) if not turns]
     if free:
-        notes.append(f"how these turn about their own line is not known and drawn anyhow: {', '.join(free)}.")
+        notes.append(
+            f"how these rotate about their own line is not known and drawn anyhow: {', '.join(free)}."
+        )
     parents = _parents(mech, links)
     base = unused_name("scene", {link.name for link in links} | {mech.name})
     scene: Any = trimesh.Scene(base_frame=base)
@@ -90,8 +92,8 @@ def glb(mech: Mechanism, poses: Array, time: Array | None = None) -> tuple[bytes
     if time is None:
         return glb_of(scene), notes
     notes.append(
-        f"the animation has {len(frames)} frames, with places and turns interpolated between them; forces "
-        "and all other results are not in it."
+        f"the animation has {len(frames)} frames, with positions and rotations interpolated between them; "
+        "forces and all other results are not in it."
     )
     return glb_of(scene, buffer_postprocessor=partial(_animate, tracks, time[placed])), notes
 
@@ -145,7 +147,7 @@ def _animate(
     clock = _accessor(tree, buffers, time - time[0], "SCALAR")
     for track in tracks:
         index, node = nodes[track.name]
-        # An animated node has its place and turn apart, not as a matrix.
+        # An animated node has its position and rotation apart, not as a matrix.
         node.pop("matrix", None)
         for path, values in (("translation", track.translation), ("rotation", track.rotation)):
             node[path] = values[0].tolist()

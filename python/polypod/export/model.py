@@ -1,4 +1,4 @@
-"""What all model formats start from: the multibody description, names, light masses, and what gets lost."""
+"""Common basis of all model formats: the multibody description, names, light masses, and omissions."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ LIGHT = 1e-6
 """Mass of a body between two axes of a joint, as a part of the heaviest link's: engines divide by masses. Its
 moments of inertia are that mass times the square of the characteristic length."""
 THIN = 1e-4
-"""The same for a link that has no mass in the mechanism: loops that are springs hold with the mass of what
-they tie, so that lighter legs let a heavy platform sink, and shake."""
+"""Mass of a link that has none in the mechanism, as a part of the heaviest link's: loops that are springs
+hold with the mass of what they tie, so that lighter legs let a heavy platform sink, and shake."""
 MASSLESS = 1.0
 """kg: what stands for the heaviest link where no link has a mass."""
 
@@ -80,7 +80,7 @@ class Model:
         return None
 
     def range_of(self, body: Body, i: int) -> Range | None:
-        """The limits of a body's freedom: stroke, turn of a revolute base joint, turn of a rod."""
+        """Limits of a body's degree of freedom: a stroke, the angle of a base R joint, or that of a rod."""
         if body.name in self.tree.rods:
             return _range(self.mech.geometry["rods"][self.tree.rods.index(body.name)]["range"])
         found = self.leg_of(body)
@@ -114,7 +114,7 @@ class Model:
 
 
 def _labels(tree: Multibody, closing: Sequence[ClosingJoint]) -> dict[tuple[str, str], str]:
-    """What joints and crosses are called instead of their names in the multibody description."""
+    """Labels of joints and crosses in place of their names in the multibody description."""
     labels: dict[tuple[str, str], str] = {}
     bodies = {body.name: body for body in tree.bodies}
     labels |= {("joint", joint_name(bodies[rod], 0)): f"{rod} turn" for rod in tree.rods}

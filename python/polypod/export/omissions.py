@@ -1,4 +1,4 @@
-"""What a mechanism file says and a format does not: nothing is left out without a word."""
+"""Contents of a mechanism file that a format cannot hold: nothing is left out without a word."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ STROKES = frozenset({"stroke min", "stroke max"})
 TURNS = frozenset({"base angle", "rod angle"})
 PLATFORM_TURNS = frozenset({"platform angle"})
 FORCES = frozenset({"force min", "force max"})
-"""Kinds of limits, as in `polypod.answers.kinematics.Limit`, that a format may carry."""
+"""Kinds of limits, as in `polypod.answers.parts.Limit`, that a format may carry."""
 
 
 def lost(model: Model, limits: Collection[str], *, gravity: bool) -> list[str]:

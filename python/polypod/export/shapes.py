@@ -1,4 +1,4 @@
-"""What links look like in a model file: meshes of their pieces by colour, or simple shapes."""
+"""Shapes of links in a model file: meshes of their pieces by colour, or simple shapes."""
 
 from __future__ import annotations
 

@@ -29,7 +29,7 @@ from polypod.vectors import inverse
 Array = NDArray[np.float64]
 
 FREE_TURN = math.pi
-"""rad: the limit of a turn, to either side, where the mechanism has none."""
+"""rad: the limit of a rotation, to either side, where the mechanism has none."""
 
 
 def urdf(
@@ -61,7 +61,7 @@ class _Writer:
         for body in model.tree.bodies:
             if body.name != PLATFORM:
                 self._tree_body(body)
-        # The fewest freedoms leave the fewest joints between the leg and the platform.
+        # The fewest degrees of freedom leave the fewest joints between the leg and the platform.
         main = min(range(len(model.closing)), key=lambda i: sum(_size(f) for f in model.closing[i].freedoms))
         for i in [main, *(i for i in range(len(model.closing)) if i != main)]:
             self._platform_joint(i, carries=i == main)
@@ -75,7 +75,7 @@ class _Writer:
         notes = [
             f"URDF knows no loops: the platform hangs on leg {leg}, and {sidecar} tells how the other legs "
             "are tied to it.",
-            f"{NO_LIMIT:g} stands for no limit, {FREE_TURN:.6g} rad for turns without one.",
+            f"{NO_LIMIT:g} stands for no limit, {FREE_TURN:.6g} rad for rotations without one.",
         ]
         if self._light:
             notes.append(
@@ -103,7 +103,7 @@ class _Writer:
     # --- links and joints --------------------------------------------------------------------------------
 
     def _tree_body(self, body: Body) -> None:
-        """A body on its parent: an elementary joint for each freedom, light links between them."""
+        """A body on its parent: an elementary joint for each degree of freedom, light links between them."""
         model = self._model
         place = inverse(model.tree.zero[body.parent]) @ body.zero
         ranges = [model.range_of(body, i) for i in range(len(body.freedoms))]

@@ -1,4 +1,4 @@
-"""What SDF and URDF write alike."""
+"""Common XML parts of SDF and URDF."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def child(
 
 
 def roll_pitch_yaw(frame: Array) -> Array:
-    """(3,): angles, rad, of turns about the fixed x, y and z of a frame's parent."""
+    """(3,): angles, rad, of rotations about the fixed x, y and z of a frame's parent."""
     return np.asarray(Rotation.from_matrix(frame[:3, :3]).as_euler("xyz", suppress_warnings=True))
 
 

@@ -89,7 +89,7 @@ def read_numbers(body: list[Row], columns: Sequence[Column | None], faults: list
 
 
 def columns_to_si(numbers: Array, columns: Sequence[Column | None]) -> Array:
-    """The same numbers in SI."""
+    """The numbers in SI."""
     si = numbers.copy()
     for i, column in enumerate(columns):
         if column and column.kind:

@@ -73,7 +73,7 @@ Inertia = Annotated[_N | _V | _M, Discriminator(_number_vector_or_matrix)]
 
 
 class Header(Part):
-    """What stands above the first table."""
+    """Entries above the first table."""
 
     name: Name
     description: str = ""
@@ -139,7 +139,7 @@ class Link(Part):
 
 
 class Range(Part):
-    """Least and greatest value: turn of an R joint or of a rod since home, active force of a leg."""
+    """Least and greatest value: rotation of an R joint or of a rod since home, active force of a leg."""
 
     min: Number
     max: Number
@@ -158,7 +158,7 @@ class Rod(Part):
 
 
 class Carriage(Part):
-    """What slides on a rail, without turning; `center` counts from the base joint, in base axes."""
+    """Carriage on a rail, which does not rotate; `center` counts from the base joint, in base axes."""
 
     mass: Number
     center: Vector = Field(default_factory=_origin)

@@ -18,7 +18,7 @@ class Table(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
 
     forms: ClassVar[dict[str, str]] = {}
-    """What an array may be under a key; [x, y, z] where nothing is said."""
+    """Forms that an array may have under a key; [x, y, z] by default."""
 
 
 TAGS = ("<polar>", "<vector>", "<number>", "<matrix>")
@@ -75,7 +75,7 @@ def _place(section: str, path: list[int | str]) -> str:
 
 
 def _message(model: type[Table], path: list[int | str], problem: dict[str, Any]) -> str:
-    """What was found and what would be valid."""
+    """The value found, and the valid ones."""
     keys = [part for part in path if isinstance(part, str)]
     match problem["type"]:
         case "missing":

@@ -19,7 +19,8 @@ class JointKind:
     name: str
     freedoms: int
     normal: Literal["free", "across", "along"]
-    """What it does to the leg's normal n: nothing, or holds it square to an axis of its body or along one."""
+    """What it does to the leg's normal n: nothing, or holds it perpendicular to an axis of its body or along
+    one."""
     has_axis: bool
     """Whether a mechanism file gives it an axis; on a rod it takes that from the rod."""
     has_normal: bool

@@ -44,7 +44,7 @@ class Slider(Drive):
     signs = "Of a slider, forces and speeds are positive along its rail's axis."
     frames = "Carriages have the base's axes, struts (n, delta, n x delta), both at the base joint."
     assumed_inertia = (
-        "carriages, which do not turn, have no moment of inertia in the mechanism file; here they have "
+        "carriages, which do not rotate, have no moment of inertia in the mechanism file; here they have "
         f"those of a radius of gyration of {CARRIAGE:g} of their struts' lengths, of no effect"
     )
     parameters_title = "Rails, through the base points, and struts"
@@ -65,7 +65,7 @@ class Slider(Drive):
         """The ends of the carriage's way."""
         point, axis = np.array(leg["base"]["point"]), self.axis(leg)
         if not np.isfinite(stroke).all():
-            # Anywhere along the axes that the rail is not square to.
+            # Anywhere along the axes that the rail is not perpendicular to.
             return np.array([np.where(axis == 0.0, point, -np.inf), np.where(axis == 0.0, point, np.inf)])
         return np.asarray(point + np.outer(stroke, axis))
 
@@ -93,7 +93,7 @@ class Slider(Drive):
         """The carriage with some inertia, the strut with its mass centre from the base joint."""
         carriage, strut = self.bodies(leg)
         if carriage is not None:
-            # It does not turn, so that its inertia is of no effect; but engines want some.
+            # It does not rotate, so that its inertia is of no effect; but engines want some.
             side = CARRIAGE * float(leg["slider"]["strut"])
             carriage = {**carriage, "inertia": carriage["mass"] * side**2 * np.eye(3)}
         # The file counts from the platform joint, where a strut without mass has its point.
@@ -101,7 +101,7 @@ class Slider(Drive):
         return carriage, {**strut, "center": strut["center"] + np.array([0.0, self.reach(leg), 0.0])}
 
     def first_axes(self, leg: Leg, foot: Array) -> Array:
-        """Those of the base: a carriage does not turn."""
+        """Those of the base: a carriage does not rotate."""
         return np.eye(3)
 
     def push(self, leg: Leg, foot: Array) -> Array:

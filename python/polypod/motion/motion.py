@@ -124,7 +124,7 @@ class Motion:
         return cls(time=time, coordinates=q, rates=rates, second_rates=second_rates, curve=curve, **more)
 
     def sample(self, time: ArrayLike) -> Motion:
-        """The same motion at other instants, (N,) in s, increasing, from its first to its last.
+        """The motion resampled at other instants, (N,) in s, increasing, from its first to its last.
 
         It follows `curve`, or without one, between two of its samples, the quintic that has their values,
         rates and second rates. The wrench is linear between samples.

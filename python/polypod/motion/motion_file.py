@@ -54,11 +54,11 @@ CoordinateSets = Mapping[str, tuple[str, ...]]
 
 
 class HasCoordinateSets(Protocol):
-    """What a motion needs of a mechanism."""
+    """Interface that a motion needs of a mechanism."""
 
     @property
     def dof(self) -> int:
-        """Freedoms of the platform."""
+        """Degrees of freedom of the platform."""
 
     @property
     def coordinate_sets(self) -> CoordinateSets:
@@ -118,8 +118,8 @@ def _find(source: str | PathLike[str]) -> Traversable:
 def _sets(mech: HasCoordinateSets | CoordinateSets, names: Iterable[str]) -> CoordinateSets:
     """The coordinate sets to choose from.
 
-    Of the set `pose` those that `names` gives, if they are as many as the mechanism has freedoms: the others
-    are then dependent.
+    Of the set `pose` those that `names` gives, if they are as many as the mechanism has degrees of freedom:
+    the others are then dependent.
     """
     if isinstance(mech, Mapping):
         return mech

@@ -1,4 +1,4 @@
-"""Platform joints as joints: what a closure allows, as freedoms in series, instead of what it demands."""
+"""Platform joints as joints: degrees of freedom in series that a closure allows, not its constraints."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def closing_joint(tree: Multibody, closure: Closure) -> ClosingJoint:
             normal = as_at_zero(n, cross(direction, side))
             turn = _turn(n, normal, delta, as_at_zero(delta, direction))
         case _:
-            raise ValueError(f"{closure.name}: no joint keeps {len(closure.squares)} turns")
+            raise ValueError(f"{closure.name}: no joint keeps {len(closure.squares)} rotations")
     a, b = closure.points
     return ClosingJoint(
         closure.name, kind, closure.bodies, (frame_at(np.eye(3), a), frame_at(turn, b)), freedoms

@@ -25,7 +25,7 @@ Inertial = tuple[float, Array]
 
 @dataclass(frozen=True, eq=False)
 class Settings:
-    """What the two uses of a skeleton have of their own."""
+    """Differences between the two uses of a skeleton."""
 
     option: Mapping[str, str]
     """Attributes of `option` beside gravity."""
@@ -74,7 +74,8 @@ def skeleton(tree: Multibody, settings: Settings) -> Skeleton:
 def configuration(tree: Multibody, placements: Placements) -> dict[str, Array]:
     """The position (qpos) of every joint with the bodies at `placements`, by the joint's name.
 
-    Of `joint_name` and `cross_name`; m and rad; w, x, y, z of a turn; the platform's point before its turn.
+    Of `joint_name` and `cross_name`; m and rad; w, x, y, z of a rotation; the platform's point before its
+    rotation.
     """
     found = {}
     placements = placements | {BASE: np.eye(4)}
@@ -97,7 +98,7 @@ def configuration(tree: Multibody, placements: Placements) -> dict[str, Array]:
 
 
 def joint_name(body: Body, i: int) -> str:
-    """Of a body's freedom, counted from 0."""
+    """Of a body's degree of freedom, counted from 0."""
     return f"{body.name} {i}"
 
 
@@ -177,5 +178,5 @@ def numbers(values: ArrayLike) -> str:
 
 
 def quaternion(frame: Array) -> Array:
-    """(4,): w, x, y, z of the turn of a frame (4, 4) or (3, 3)."""
+    """(4,): w, x, y, z of the rotation of a frame (4, 4) or (3, 3)."""
     return np.asarray(np.roll(Rotation.from_matrix(frame[:3, :3]).as_quat(), 1))

@@ -37,7 +37,7 @@ class Turning:
     axis: Array
     """(3,): unit vector in the axes of base or platform."""
     along: bool
-    """n is the axis itself (R, F), or square to it and to the leg (U)."""
+    """n is the axis itself (R, F), or perpendicular to it and to the leg (U)."""
 
 
 def leg_bodies(leg: Mapping[str, Any]) -> tuple[str, str]:
@@ -52,7 +52,7 @@ def rod_body(rod: Mapping[str, Any]) -> str:
 
 
 def turning_of(geometry: Mapping[str, Any], leg: Mapping[str, Any]) -> Turning | None:
-    """What keeps a leg from spinning: its base joint if that is U, R or F, else its platform joint."""
+    """Joint that keeps a leg from spinning: its base joint if that is U, R or F, else its platform joint."""
     if leg["base"]["rod"] is not None:
         return Turning("base", unit(geometry["rods"][leg["base"]["rod"]]["axis"]), along=False)
     sides: tuple[Literal["base", "platform"], ...] = ("base", "platform")

@@ -46,7 +46,7 @@ class Freedom:
 
 @dataclass(frozen=True, eq=False)
 class Body:
-    """A link, and how it hangs on its parent: by freedoms in series, the first at the parent."""
+    """A link, and how it hangs on its parent: by degrees of freedom in series, the first at the parent."""
 
     name: str
     parent: str
@@ -63,15 +63,15 @@ class Body:
 
 @dataclass(frozen=True, eq=False)
 class Closure:
-    """What a joint that closes a loop demands of two bodies."""
+    """Constraints of a joint that closes a loop, on two bodies."""
 
     name: str
     bodies: tuple[str, str]
     points: tuple[Array, Array] | None
     """(3,) each, in the frames of the two bodies: they coincide. None where the bodies share no point."""
     squares: tuple[tuple[Array, Array], ...]
-    """Axes of the first and of the second body, in their own axes, that stay square: a pair for each turn
-    that the joint does not allow."""
+    """Axes of the first and of the second body, in their own axes, that stay perpendicular: a pair for each
+    rotation that the joint does not allow."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,7 +87,7 @@ class LegParts:
     coordinate: float
     """The drive's coordinate where its joint is at zero, m or rad."""
     spins: bool
-    """Whether the leg may turn freely about its own axis."""
+    """Whether the leg may rotate freely about its own axis."""
     drive: Drive
     geometry: Mapping[str, Any]
     """The leg in `Mechanism.geometry`."""
@@ -99,7 +99,7 @@ class LegParts:
 
     @property
     def hinge(self) -> str:
-        """The link that the base joint turns: the cylinder, or the strut."""
+        """The link that the base joint rotates: the cylinder, or the strut."""
         return self.second if self.drive.moves_foot else self.first
 
     @property
@@ -122,12 +122,12 @@ class Multibody:
     legs: tuple[LegParts, ...]
     rods: tuple[str, ...]
     scale: float
-    """What lengths are divided by where they stand beside angles, m."""
+    """Length that makes lengths comparable with angles, m."""
     geometry: Mapping[str, Any]
     """The mechanism file's numbers in SI, as `Mechanism.geometry`."""
     idle: tuple[tuple[str, Array], ...] = ()
-    """Turns of the platform that no leg feels: the body that their line is fixed in, BASE or PLATFORM, and
-    the line's direction (3,) in its axes."""
+    """Rotations of the platform that no leg feels: the body that their line is fixed in, BASE or PLATFORM,
+    and the line's direction (3,) in its axes."""
 
     @property
     def zero(self) -> Placements:
@@ -168,9 +168,9 @@ def describe(mech: Mechanism) -> Multibody:
 
 
 def release(tree: Multibody) -> Multibody:
-    """The same bodies with the platform set free: how they move off the constraints, by convention [T62].
+    """The bodies with the platform set free: their motion off the constraints, by convention [T62].
 
-    Each leg follows its point of the platform, a carriage on its rail, and turns by the joint that keeps it
+    Each leg follows its point of the platform, a carriage on its rail, and rotates by the joint that keeps it
     from spinning, the base joint if it does; a rod follows the first leg that it carries.
     """
     bodies, closures = [], []
@@ -183,7 +183,7 @@ def release(tree: Multibody) -> Multibody:
         closures.append(Closure(f"leg {parts.name} end", (parts.second, PLATFORM), _leg_ends(leg), ()))
         turning = turning_of(tree.geometry, leg)
         if turning is not None:
-            # U: n is square to the axis; R and F: n is the axis, or n×δ is square to it.
+            # U: n is perpendicular to the axis; R and F: n is the axis, or n×δ is perpendicular to it.
             other = BASE if turning.side == "base" else PLATFORM
             pair = (Z if turning.along else X, turning.axis)
             closures.append(Closure(f"leg {parts.name} spin", (parts.second, other), None, (pair,)))
@@ -198,7 +198,7 @@ def release(tree: Multibody) -> Multibody:
 
 
 def joint_values(body: Body, zero: Array, now: Array) -> list[float | Array]:
-    """The value of each freedom of a body: angle, displacement, or rotation (3, 3); none for free.
+    """The value of each degree of freedom of a body: angle, displacement, or rotation (3, 3); none for free.
 
     `zero` and `now` are the body's frame (4, 4) in its parent's, with all joints at zero and now. Where no
     values give `now`, they are some nearby.
@@ -213,7 +213,7 @@ def joint_values(body: Body, zero: Array, now: Array) -> list[float | Array]:
             case "spherical":
                 values.append(rotation)
             case "revolute":
-                # The turn that brings the next axis, which turns with this one alone, to where it is.
+                # The rotation that brings the next axis, which rotates with this one alone, to where it is.
                 rest = body.freedoms[i + 1 :]
                 seen = rest[0].axis if rest else perpendiculars(freedom.axis)[0]
                 angle = turn_about(freedom.axis, seen, rotation @ seen)
@@ -278,7 +278,7 @@ def _leg(geometry: Mapping[str, Any], parts: LegParts, zero: Placements) -> list
 
 
 def _base_freedoms(joint: Mapping[str, Any], zero: Array) -> tuple[Freedom, ...]:
-    """Freedoms of a base joint, from base, rod or carriage to the cylinder or strut with the frame `zero`."""
+    """Degrees of freedom of a base joint, to the cylinder or strut with the frame `zero`."""
     about_n = Freedom("revolute", X)
     match joint["joint"]:
         case "S":

@@ -1,4 +1,4 @@
-"""What pictures with several panels are drawn on: a figure, or a part of one, and cells for axes in it."""
+"""Canvas of pictures with several panels: a figure, or a part of one, and cells for axes in it."""
 
 from __future__ import annotations
 

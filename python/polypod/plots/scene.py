@@ -96,7 +96,7 @@ class Scene:
         spec = mech.geometry
         self.faces = Faces()
         self.overlay = Faces()
-        """What is drawn over the bodies even where they hide it."""
+        """Lines and labels drawn over the bodies even where they hide them."""
         self.labels: list[tuple[Array, str]] = []
         self.joint_labels: list[_JointLabel] = []
         sides = [leg[side]["joint"] for leg in spec["legs"] for side in ("base", "platform")]
@@ -181,7 +181,7 @@ def draw(ax: Axes3D, scene: Scene, half: Array, zoom: float, labels: bool) -> No
 
 
 def frame(ax: Axes3D, corners: Array, half: Array, zoom: float | None = None) -> float:
-    """Turns the axes to the view and centres the corners in them, with the same scale along all axes.
+    """Rotates the axes to the view and centres the corners in them, with the same scale along all axes.
 
     The limits span `half` to each side of the centre; with `zoom` that is the scale. Without it the corners
     fill the axes. Returns the zoom.

@@ -104,7 +104,7 @@ def _panel_of(data: xr.Dataset, name: str, where: dict[str, Any]) -> Panel:
 
 
 def _curves(column: xr.DataArray) -> tuple[str, ...]:
-    """What each curve is of: legs and rods as such, others by their label."""
+    """Labels of the curves: legs and rods by name, others by their label."""
     if column.ndim == 1:
         return ("",)
     dim = str(column.dims[1])

@@ -243,7 +243,7 @@ def _draw_outline(ax: Axes, workspace: Workspace) -> None:
 
 
 def _legend(workspace: Workspace, figure: Canvas) -> int:
-    """What ends the workspace, below the picture in rows; the number of rows."""
+    """Draws the causes of the boundary below the picture in rows; returns the number of rows."""
     handles = _handles(workspace)
     columns = min(len(handles), max(int(size_of(figure)[0] / 1.55), 1))
     by_column = [handle for column in range(columns) for handle in handles[column::columns]]

@@ -43,7 +43,7 @@ class Series:
     _known: dict[bytes, int] = field(default_factory=dict)
 
     def add(self, chart: Chart) -> dict[str, Any]:
-        """What the page's template shows of a chart; its numbers are kept."""
+        """Data of a chart for the page's template; its numbers are kept."""
         panel, at = chart.panel, kept(chart.panel.values)
         self.decimated |= len(at) < len(panel.values)
         curves = [

@@ -1,4 +1,4 @@
-"""All that a report tells, worked out: each part once, by the functions that the commands use."""
+"""Contents of a report, computed: each part once, by the functions that the commands use."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ Progress = Callable[[float, float], None]
 
 @dataclass(frozen=True)
 class Along:
-    """What is told of a motion."""
+    """Contents of a report on a motion."""
 
     solution: Solution
     facts: dict[str, Any]
@@ -41,7 +41,7 @@ class Along:
 
 @dataclass(frozen=True)
 class Content:
-    """All that a report tells."""
+    """Contents of a report."""
 
     mech: Mechanism
     facts: dict[str, Any]
@@ -83,7 +83,7 @@ def _sampled(motion: Motion, samples: int) -> Motion:
 
 
 def along_of(mech: Mechanism, solution: Solution, source: Source) -> Along:
-    """What is told of a motion that is solved."""
+    """Contents of a report on a solved motion."""
     return Along(
         solution,
         summarise(mech, solution),
@@ -99,7 +99,7 @@ def workspace_of(
     """The reachable workspace, or why there is none.
 
     Where o does not move freely in space, as that of a 3-RPS, no grid of its positions can be followed. Two
-    or three freedoms then have a slice over their own coordinates, which leaves nothing out.
+    or three degrees of freedom then have a slice over their own coordinates, which leaves nothing out.
     """
     if isinstance(wanted, Workspace):
         return wanted, ""

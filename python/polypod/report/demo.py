@@ -30,7 +30,7 @@ EXAMPLE = MECHANISM
 
 @dataclass(frozen=True)
 class Demo:
-    """What the demo found, and the files that it wrote."""
+    """Results of the demo, and the files that it wrote."""
 
     directory: Path
     files: tuple[str, ...]
@@ -134,7 +134,7 @@ curves are in a figure without numbers; this motion is Polypod's.
 |---|---|---|---|---|
 {rows}
 
-- {mobility["dof"]} freedoms; legs {"+".join(leg["joints"] for leg in facts["legs"])}.
+- {mobility["dof"]} degrees of freedom; legs {"+".join(leg["joints"] for leg in facts["legs"])}.
 - {"; ".join(outcomes) or "All states have an answer, inside the strokes"}.
 - Couple-constrained forces f_c1 and f_c3 peak at {_pair(coupled["peak_forces"])} N, the torque T_c on the rod
   at {coupled["peak_torque"]:.0f} N m; {coupled["note"]}.
@@ -160,7 +160,7 @@ curves are in a figure without numbers; this motion is Polypod's.
 - `fig3.png`: Fig. 3; `fig4.png`: the panels of Fig. 4; `poses.png`: Fig. 1a, c-e; `topology.png`: Fig. 1b;
   all as SVG, too
 - `solution.nc`, `solution.csv`: every quantity with its unit; `polypod.load_solution` reads both
-- `polypod info {facts["name"]}`: freedoms, constraints, conditioning, warnings
+- `polypod info {facts["name"]}`: degrees of freedom, constraints, conditioning, warnings
 - `polypod solve {facts["name"]} your-motion.csv -o result.nc`: your own motion
 """
 

@@ -28,7 +28,7 @@ class Picture(NamedTuple):
     address: str
     """data:image/svg+xml;base64,…"""
     text: str
-    """What it shows, for those who cannot see it."""
+    """Alternative text."""
 
 
 def mechanism_picture(mech: Mechanism) -> Picture:

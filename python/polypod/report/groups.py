@@ -160,7 +160,7 @@ def _coordinate(name: str) -> str:
 
 
 def leg_charts(data: xr.Dataset, leg: int, links: tuple[str, str]) -> list[Chart]:
-    """How one leg turns, how its two links move, and the angles of its joints."""
+    """How one leg rotates, how its two links move, and the angles of its joints."""
     time = data["time"].to_numpy()
 
     def three(name: str, label: str, symbol: str, unit: str, scale: float = 1.0) -> Panel:

@@ -1,4 +1,4 @@
-"""What a report was made from: texts of the files, versions, command line."""
+"""Inputs of a report: texts of the files, versions, command line."""
 
 from __future__ import annotations
 

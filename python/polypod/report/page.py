@@ -1,4 +1,4 @@
-"""The page: what a report tells, in the template, with all that a browser needs to show it."""
+"""The page: the contents of a report, in the template, with all that a browser needs to show it."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def report_html(
         samples: solve at so many instants evenly over the motion instead of at its own.
         workspace: whether to find the reachable workspace; or one that is there already.
         step: width of the workspace's cells, m; by default the widest bounds have 64.
-        command: the command line that is told for reproduction.
+        command: the command line that is shown for reproduction.
         progress: called now and then with the number of states solved and the number of all.
 
     Raises:
@@ -125,7 +125,7 @@ def _asset(name: str) -> str:
 
 
 def _hash(script: str) -> str:
-    """What the page's security policy knows a script by, so that no other one runs."""
+    """Hash of a script for the page's security policy, so that no other one runs."""
     return base64.b64encode(hashlib.sha256(script.encode("utf-8")).digest()).decode("ascii")
 
 

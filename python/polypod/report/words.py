@@ -1,4 +1,4 @@
-"""What a report says in words, and at a glance."""
+"""Texts of a report, and its overview."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from polypod.summary.tables import Table, fixed, in_range, outcome, significant
 
 
 def warnings(content: Content) -> list[str]:
-    """Whatever a reader should know first: of the mechanism, of its motion, of limits and of lost states."""
+    """Warnings at the top: of the mechanism, of its motion, of limits and of lost states."""
     found = [_sentence(warning) for warning in content.facts["warnings"]]
     if content.along is None:
         return found
@@ -37,7 +37,7 @@ def lost(facts: dict[str, Any]) -> list[str]:
 
 
 def outcomes(facts: dict[str, Any]) -> str:
-    """What became of all states, in one sentence."""
+    """Outcomes of all states, in one sentence."""
     if not facts["outcomes"]:
         return outcome(facts)
     without, states = facts["without_answer"], facts["states"]
@@ -65,7 +65,7 @@ def glance(content: Content) -> list[tuple[str, str]]:
 
 
 def workspace_words(facts: dict[str, Any]) -> str:
-    """What the workspace is, in one sentence."""
+    """Description of the workspace, in one sentence."""
     if facts["kind"] == "reachable":
         return "All positions of o that can be reached inside all limits, whatever the orientation."
     *names, last = facts["extents"]

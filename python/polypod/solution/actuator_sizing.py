@@ -1,4 +1,4 @@
-"""What a motion asks of each actuator, as plain data: SI, None where there is no number."""
+"""Requirements of a motion on each actuator, as plain data: SI, None where there is no number."""
 
 from __future__ import annotations
 

@@ -20,9 +20,10 @@ Array = NDArray[np.float64]
 class ComputedTorque:
     """Forces that make a mechanism follow a motion: the law for `forces` of `polypod.simulate` [T55].
 
-    Legs are told the accelerations ℓ'' = ℓ_d'' + 2ζω (ℓ_d' - ℓ') + ω² (ℓ_d - ℓ), d for desired, and inverse
+    Legs are given the accelerations ℓ'' = ℓ_d'' + 2ζω (ℓ_d' - ℓ') + ω² (ℓ_d - ℓ), d for desired, and inverse
     dynamics gives their forces. With the masses of the mechanism that is driven, the error of every leg's
-    length is a damped oscillation. Lengths tell a pose within one aspect only: start in that of the motion.
+    length is a damped oscillation. Lengths determine a pose within one aspect only: start in that of the
+    motion.
 
     >>> import polypod as pp
     >>> mech = pp.load("lu-3spu-2rpu-r")
@@ -37,7 +38,7 @@ class ComputedTorque:
     mech: Mechanism
     """The model: what the controller knows of the mechanism."""
     motion: Motion
-    """What is wanted; before and after it, its first and last state."""
+    """Desired motion; before and after it, its first and last state."""
     frequency: float
     """ω, rad/s."""
     damping: float = 1.0
@@ -48,7 +49,7 @@ class ComputedTorque:
         if self.mech.redundantly_actuated:
             why = "redundant legs that each follow a law of their own would contradict one another"
         elif self.mech.mobility().idle:
-            why = "no leg gives the torque about the line of an idle freedom, which the law would ask for"
+            why = "no leg gives the torque about the line of a local degree of freedom, which the law needs"
         if why is not None:
             raise UnsupportedError(f"{self.mech.name}: no computed torque in leg lengths: {why}")
         for name in ("frequency", "damping"):
@@ -66,7 +67,7 @@ class ComputedTorque:
         return self._desired(time)[0]
 
     def _desired(self, time: float) -> tuple[Kinematics, Motion]:
-        """The same, and the motion at this instant."""
+        """Desired motion of the legs at a time, s, and that of the coordinates."""
         first, last = self.motion.time[[0, -1]].tolist()
         sample = self.motion.sample([min(max(time, first), last)])
         rates, second_rates = sample.rates, sample.second_rates

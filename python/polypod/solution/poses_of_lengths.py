@@ -91,7 +91,7 @@ def tabulate_continued(mech: Mechanism, lengths: ArrayLike, mode: int | None = N
     From home, or from a mode of the first row, counted from 1 as `tabulate_modes` does. From a home that is
     nearly singular, as the published one, few lengths are reached.
     The form is that of `tabulate_modes`, with at most one mode in a row; the side of the base and how many
-    modes meet are None, as one pose alone does not tell them.
+    modes meet are None, as one pose alone does not determine them.
 
     Raises:
         CoordinateError: the first row has no mode of that number.

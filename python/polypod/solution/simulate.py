@@ -1,7 +1,8 @@
 """Simulation: how a mechanism moves under forces, integrated on the poses that it can have [T53, T54].
 
-The unknowns are local coordinates of those poses, as many as the mechanism has freedoms, in which the
-constraints hold by construction; the integrator is scipy's DOP853, Dormand and Prince's method of order 8.
+The unknowns are local coordinates of those poses, as many as the mechanism has degrees of freedom, in which
+the constraints hold by construction; the integrator is scipy's DOP853, Dormand and Prince's method of order
+8.
 """
 
 from __future__ import annotations
@@ -294,7 +295,7 @@ def _integrate(
 
 
 class _Events:
-    """What stops a motion: functions of the state that must not become negative [T54]."""
+    """Events that stop a motion: functions of the state that must not become negative [T54]."""
 
     def __init__(
         self, mech: Mechanism, drive: _Drive, stop: Sequence[str], sigma_min: float | None, start: _Instant
@@ -369,7 +370,7 @@ class _Events:
 
 
 def _solution(mech: Mechanism, drive: _Drive, instants: list[_Instant], end: End) -> Solution:
-    """The same quantities as along a given motion; the forces are those that drive it."""
+    """Dataset with the quantities of a given motion; the forces are those that drive it."""
     time, pose, twist = (np.array(part) for part in zip(*instants, strict=True))
     dynamics = drive.dynamics(instants)
     set = "natural" if "natural" in mech.coordinate_sets else "pose"

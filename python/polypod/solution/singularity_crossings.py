@@ -9,8 +9,8 @@ The findings are plain data that JSON holds; times in s, measures pure numbers, 
         around it.
     near: list of {kind, leg, start, end, time, minimum}; intervals of known instants at which the measure of
         that kind is below the threshold, its least value and when
-    uncontrolled: freedoms that the locked actuators leave at every pose, by design; crossings are then not
-        sought
+    uncontrolled: degrees of freedom that the locked actuators leave at every pose, by design; crossings are
+        then not sought
 """
 
 from __future__ import annotations
@@ -65,7 +65,7 @@ class _Known:
 def find_passages(
     mech: Mechanism, motion: Motion, pose: Array, determinant: Determinant, threshold: float = NEAR_SINGULAR
 ) -> dict[str, Any]:
-    """What a motion, solved at its samples, meets of singular poses: the findings described above."""
+    """Singular poses that a motion, solved at its samples, meets: the findings described above."""
     known = _Known(*map(np.ascontiguousarray, (motion.time, pose, determinant.determinant, determinant.rate)))
     uncontrolled, crossings = mech.mobility().uncontrolled, []
     if not uncontrolled:
@@ -82,7 +82,7 @@ def find_passages(
 def sampled_passages(
     mech: Mechanism, time: Array, pose: Array, determinant: Determinant, threshold: float = NEAR_SINGULAR
 ) -> dict[str, Any]:
-    """The same for states that are known at their instants only: zeros between them are those of cubics."""
+    """Singular poses between states known at their instants only: zeros between them are those of cubics."""
     known = _Known(*map(np.ascontiguousarray, (time, pose, determinant.determinant, determinant.rate)))
     uncontrolled = mech.mobility().uncontrolled
     return {

@@ -46,7 +46,8 @@ def solve(
 
     Returns:
         A `Solution`, whose dataset has one variable for each quantity, SI, and the `Status` of every state.
-        Its `singularities` tell which singular poses the motion crosses or comes near, also between samples.
+        Its `singularities` list the singular poses that the motion crosses or comes near, also between
+        samples.
 
     >>> import polypod as pp
     >>> mech = pp.load("lu-3spu-2rpu-r")

@@ -18,7 +18,7 @@ SHIFT = 0.1
 """How far an independent coordinate is moved to see what others do: rad, and of the characteristic length."""
 
 STILL = 1e-9
-"""What changes less, in rad and in characteristic lengths, does not move."""
+"""Largest change, in rad and in characteristic lengths, that counts as none."""
 
 
 def freedoms(mech: Mechanism) -> dict[str, Any]:
@@ -45,7 +45,7 @@ def freedoms(mech: Mechanism) -> dict[str, Any]:
 
 
 def screws(mech: Mechanism) -> list[dict[str, Any]]:
-    """What the platform is free to do at the centre pose: principal screws of the base.
+    """Degrees of freedom of the platform at the centre pose: principal screws, base axes.
 
     `kind` is translation, turn or screw; `pitch`, in m/rad, is None for a translation.
     """

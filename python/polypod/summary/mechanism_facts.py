@@ -1,4 +1,4 @@
-"""What is worth telling about a mechanism, as plain data: JSON holds it as it is.
+"""Facts about a mechanism, as plain data: JSON holds them as they are.
 
 SI units and radians. Numbers that do not exist (no stroke limit, no answer) are None.
 """
@@ -27,7 +27,7 @@ CONDITIONS = {
     "D": "an axis of the platform stays at right angles to one of the base",
     "E": "keeps its angle about the rod to the first leg on it",
 }
-"""What the constraints of theory [T9] demand, by kind."""
+"""Conditions of the constraints of theory [T9], by kind."""
 
 _MOBILITY = (
     *("dof", "links", "joints", "joint_freedoms", "loops", "closure_rank"),
@@ -59,7 +59,7 @@ def legs_in_short(letters: Sequence[str]) -> str:
 
 
 def catalogue() -> list[dict[str, Any]]:
-    """All that `polypod list` tells: name, legs, freedoms and description of each built-in mechanism."""
+    """Facts of `polypod list`: name, legs, degrees of freedom and description of each built-in mechanism."""
     return [
         {
             "name": name,
@@ -73,7 +73,7 @@ def catalogue() -> list[dict[str, Any]]:
 
 
 def describe(mech: Mechanism) -> dict[str, Any]:
-    """All that `polypod info` tells about a mechanism."""
+    """Facts of `polypod info` about a mechanism."""
     mobility, file = mech.mobility(), mech.to_dict()
     centre = mech.conditioning(mech.home)
     home = mech.inverse_kinematics(mech.home).lengths
@@ -153,8 +153,8 @@ def accounting(mobility: Mobility) -> dict[str, Any]:
     published = row(p.redundant, p.passive)
     why = (
         f"the loop closures have rank {m.closure_rank} of {6 * m.loops}, so {m.redundant} are redundant; "
-        f"{m.joint_freedoms} joint freedoms less {m.closure_rank} leave {m.joint_freedoms - m.closure_rank}, "
-        f"of which the platform has {m.dof}, so {m.passive} are passive"
+        f"{m.joint_freedoms} joint degrees of freedom less {m.closure_rank} leave "
+        f"{m.joint_freedoms - m.closure_rank}, of which the platform has {m.dof}, so {m.passive} are passive"
     )
     if published["sum"] != m.dof:
         note = f"the published terms add up to {published['sum']}, not to {m.dof}: {why}"

@@ -1,4 +1,4 @@
-"""What is worth telling about a solution, as plain data: JSON holds it as it is.
+"""Facts about a solution, as plain data: JSON holds them as they are.
 
 SI units and radians. Numbers that do not exist (no stroke limit, no answer) are None.
 """

@@ -77,14 +77,14 @@ def mobility_table(facts: Facts) -> Table:
     """The terms of mobility."""
     mobility = facts["mobility"]
     terms: tuple[tuple[str, str, str], ...] = (
-        ("freedoms of the platform", "dof", _idle(mobility["idle"])),
+        ("degrees of freedom of the platform", "dof", _idle(mobility["idle"])),
         ("links, with the base", "links", ""),
         ("joints", "joints", ""),
-        ("joint freedoms", "joint_freedoms", ""),
+        ("joint degrees of freedom", "joint_freedoms", ""),
         ("independent loops", "loops", f"{6 * mobility['loops']} closure equations"),
         ("rank of the loop closures", "closure_rank", ""),
         ("redundant constraints", "redundant", _of_legs("couple", mobility["redundant_legs"])),
-        ("passive freedoms", "passive", _of_legs("spin of", mobility["passive_legs"])),
+        ("passive degrees of freedom", "passive", _of_legs("spin of", mobility["passive_legs"])),
     )
     if mobility["rows"] > 6:
         terms = (
@@ -151,7 +151,7 @@ def constraints_table(facts: Facts) -> Table:
 
 
 def wrenches_table(facts: Facts) -> Table:
-    """What the constraints can transmit at the centre pose."""
+    """Table of the wrenches that the constraints can transmit at the centre pose."""
     rows = [
         (
             row["leg"],
@@ -169,7 +169,7 @@ def wrenches_table(facts: Facts) -> Table:
 
 
 def screws_table(facts: Facts) -> Table:
-    """What the platform is free to do at the centre pose."""
+    """Table of the degrees of freedom of the platform at the centre pose."""
     rows = [
         (
             row["kind"],
@@ -179,8 +179,8 @@ def screws_table(facts: Facts) -> Table:
         )
         for row in facts["freedoms"]["screws"]
     ]
-    headers = ("freedom", "axis>", "through / mm>", "pitch / mm/rad>")
-    return Table("Freedoms at the centre pose: principal screws, base axes", headers, rows)
+    headers = ("degree of freedom", "axis>", "through / mm>", "pitch / mm/rad>")
+    return Table("Degrees of freedom at the centre pose: principal screws, base axes", headers, rows)
 
 
 def _pitch(value: float | None) -> str:
@@ -188,7 +188,7 @@ def _pitch(value: float | None) -> str:
 
 
 def coupled_table(facts: Facts) -> Table:
-    """What follows when one independent coordinate is moved from the centre pose."""
+    """Table of the dependent coordinates when one independent coordinate is moved from the centre pose."""
     rows = []
     for row in facts["freedoms"]["coupled"]:
         moved = row["coordinate"]
@@ -200,7 +200,7 @@ def coupled_table(facts: Facts) -> Table:
         rows.append((moved, _signed(row["change"], coordinate_unit(moved)), follow))
     note = "The other independent coordinates stay where they are." if rows else ""
     headers = ("moved", "by>", "follow")
-    return Table("Freedoms: independent coordinates, and what follows", headers, rows, note)
+    return Table("Degrees of freedom: independent coordinates, and what follows", headers, rows, note)
 
 
 def _vector(values: Sequence[float], digits: int, factor: float = 1.0) -> str:
@@ -241,7 +241,7 @@ def centre_table(facts: Facts) -> Table:
 
 
 def limits_table(facts: Facts) -> Table:
-    """What the mechanism file allows, and the slack that the centre pose leaves."""
+    """Table of the limits of the mechanism file, and their slack at the centre pose."""
     rows = [
         (
             row["name"],
@@ -256,7 +256,7 @@ def limits_table(facts: Facts) -> Table:
 
 
 def allowed(limit: Facts) -> str:
-    """What a limit allows."""
+    """Allowed range of a limit."""
     least, greatest = (None if end is None else readable(end, limit["unit"]) for end in limit["allowed"])
     if least is None or greatest is None:
         return f"at most {greatest}" if least is None else f"at least {least}"
@@ -359,7 +359,7 @@ def passed_table(facts: Facts) -> Table:
 
 
 def outcomes_table(facts: Facts) -> Table:
-    """What became of the states that are not OK."""
+    """Table of the states that are not OK."""
     rows = [
         (row["status"], str(row["count"]), f"{row['first_time']:g}", row["message"])
         for row in facts["outcomes"]
@@ -379,7 +379,7 @@ def outcome(facts: Facts) -> str:
 
 
 def coupled_note(facts: Facts) -> str:
-    """What the couple-constrained forces take for granted, if there are any."""
+    """Assumptions of the couple-constrained forces, if there are any."""
     return f"Note: {facts['coupled']['note']}." if facts["coupled"] else ""
 
 
@@ -415,7 +415,7 @@ def content(facts: Facts) -> str:
 
 
 def ends_table(facts: Facts) -> Table:
-    """What ends a workspace."""
+    """Table of the causes of a workspace's boundary."""
     rows = [(name, f"{100 * share:.1f} %") for name, share in facts["boundary"].items()]
     return Table("What ends it", ("", "part of the boundary>"), rows)
 

@@ -45,7 +45,7 @@ class Comparison:
     agrees: bool
     """All states are compared, and no relative error exceeds the tolerance."""
     notes: tuple[str, ...] = ()
-    """What to know of the engine's answers."""
+    """Notes on the engine's answers."""
 
 
 @dataclass(frozen=True)
@@ -345,7 +345,7 @@ def _compare(
 
 
 def _idle_loads(tree: Multibody, pose: Array, torques: Array) -> Array:
-    """(N, 6): torques about the lines of idle freedoms as loads, which the efficiency divides."""
+    """(N, 6): torques about the lines of local degrees of freedom as loads, which the efficiency divides."""
     found = np.zeros((len(pose), 6))
     for (body, axis), torque in zip(tree.idle, np.nan_to_num(torques).T, strict=True):
         along = pose[:, :3, :3] @ axis if body == PLATFORM else np.broadcast_to(axis, (len(pose), 3))

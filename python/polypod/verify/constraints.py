@@ -1,6 +1,6 @@
 """A mechanism's joints as scalar constraints between free links: velocities, and which are redundant.
 
-For engines that give every link six freedoms and want independent constraints [T63].
+For engines that give every link six degrees of freedom and want independent constraints [T63].
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ CLOSED = 1e-10
 
 @dataclass(frozen=True, eq=False)
 class Slide:
-    """The point of the second body stays square to an axis of the first, seen from the first's point."""
+    """The second body's point, seen from the first's, stays perpendicular to an axis of the first."""
 
     name: str
     bodies: tuple[str, str]
@@ -41,7 +41,7 @@ class Slide:
 
 @dataclass(frozen=True, eq=False)
 class Square:
-    """An axis of the first and one of the second body stay square."""
+    """An axis of the first and one of the second body stay perpendicular."""
 
     name: str
     bodies: tuple[str, str]
@@ -59,7 +59,7 @@ def rows_of(tree: Multibody) -> tuple[Row, ...]:
 
 
 def _joint_rows(body: Body, parent: Array) -> list[Row]:
-    """What a body's joint to its parent, with the frame (4, 4) at zero, leaves it not free to do."""
+    """Constraints of a body's joint to its parent, with the frame (4, 4) at zero."""
     seen = inverse(parent) @ body.zero
     bodies = (body.parent, body.name)
     slides: Sequence[Array] = (X, Y, Z)
@@ -79,7 +79,7 @@ def _joint_rows(body: Body, parent: Array) -> list[Row]:
         case []:
             pass
         case kinds:
-            raise NotImplementedError(f"{body.name}: no constraints for the freedoms {kinds}")
+            raise NotImplementedError(f"{body.name}: no constraints for the degrees of freedom {kinds}")
     name = f"{body.name} on {body.parent}"
     points = (seen[:3, 3], POINT)
     turn = seen[:3, :3]
@@ -138,7 +138,7 @@ def _gradients(row: Row, first: Array, second: Array) -> tuple[Array, Array]:
         return np.array([*POINT, *normal]), np.array([*POINT, *-normal])
     axis = first[:3, :3] @ row.axis
     arm = second[:3, :3] @ row.points[1]
-    # The axis turns with the first body, so that all of it moves with the arm to the second body's point.
+    # The axis rotates with the first body, so that all of it moves with the arm to the second body's point.
     reach = second[:3, 3] + arm - first[:3, 3]
     return np.array([*-axis, *cross(axis, reach)]), np.array([*axis, *cross(arm, axis)])
 

@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 
 
 class Twin(Protocol):
-    """What drives an engine: made from a `Multibody`, it answers for one state."""
+    """Driver of an engine: made from a `Multibody`, it answers for one state."""
 
     version: str
 
@@ -30,14 +30,14 @@ class Twin(Protocol):
 
 
 class Driven(Protocol):
-    """What drives an engine that is given forces, those of `Engine.approximate`."""
+    """Driver of an engine that is given forces, those of `Engine.approximate`."""
 
     version: str
 
     def __init__(self, tree: Multibody) -> None: ...
 
     def notes(self) -> list[str]:
-        """What to know of the engine's answers so far, in sentences."""
+        """Notes on the engine's answers so far, in sentences."""
 
     def answer(
         self, pose: Array, twist: Array, wrench: Array, forces: Array

@@ -35,7 +35,7 @@ that two widths leave, of second order, is as large as rounding over the width."
 SPECTRAL_RADIUS = 0.9
 """Of the generalised-alpha integrator at infinite frequency: it damps what the constraints excite."""
 
-# What it prints would stand among what a command prints; failures are told by status.
+# What it prints would stand among what a command prints; failures are reported by status.
 exudyn.config.printToConsole = False
 _OUTPUT = exudyn.OutputVariableType
 _NOW = exudyn.ConfigurationType.Current
@@ -141,7 +141,7 @@ class System:
             axes, which = (_axis_in_column(row.axis, 0), np.eye(3)), 0
             points = row.points
         else:
-            # Its first turn keeps y of the first marker square to z of the second.
+            # Its first rotation keeps y of the first marker perpendicular to z of the second.
             axes, which = (_axis_in_column(row.axes[0], 1), _axis_in_column(row.axes[1], 2)), 3
             points = (POINT, POINT)
         markers = [self._marker(body, *at) for body, *at in zip(row.bodies, axes, points, strict=True)]

@@ -28,10 +28,11 @@ Array = NDArray[np.float64]
 STIFF = {"solimp": "0.9999 0.9999 0.001 0.5 2", "solref": "0.0002 1"}
 """The highest impedance that MuJoCo takes, at any error, and a time constant of two steps, s."""
 PATIENT = STIFF | {"solref": "1 1"}
-"""The same, but errors of position, which are rounding, are taken back slowly, not by accelerations."""
+"""Solver settings with which errors of position, which are rounding, are removed slowly, not by
+accelerations."""
 EVEN = 0.01
-"""What a constraint gives way is proportional to the mobility of its links, which MuJoCo takes from the zero
-of the model: a light link that carries heavy ones hardly holds them. In passes all get this part of the
+"""The yield of a constraint is proportional to the mobility of its links, which MuJoCo takes from the zero of
+the model: a light link that carries heavy ones hardly holds them. In passes all get this part of the
 platform's."""
 CONVERGED = 1e-12
 """Largest change of an acceleration from one pass to the next, as a part of the greatest of all links or of

@@ -55,7 +55,7 @@ class Tree:
         self.model = pin.Model()
         self.model.gravity.linear = np.array(tree.geometry["gravity"], dtype=np.float64)
         self._joints: dict[str, list[int]] = {}
-        """Pinocchio's joints of each body, one for each freedom."""
+        """Pinocchio's joints of each body, one for each degree of freedom."""
         self._carrier = {BASE: (0, np.eye(4))}
         """The joint that moves a body, and the body's frame in that joint's."""
         self._zero = tree.zero
@@ -350,8 +350,8 @@ class Twin:
     ) -> tuple[Array, Array, int, Status]:
         """Forces of the prismatic joints that do the work of all others on all allowed motions [T61].
 
-        With them the torques about the lines of idle freedoms, the number of allowed motions, and whether
-        they determine the forces; redundant ones are the least.
+        With them the torques about the lines of local degrees of freedom, the number of allowed motions, and
+        whether they determine the forces; redundant ones are the least.
         """
         tree = self.tree
         required = tree.required(moved, twist, wrench)
@@ -369,7 +369,7 @@ class Twin:
         return forces, found[len(driven) :], allowed.shape[1], status
 
     def _spins(self, tree: Tree, pose: Array) -> Array:
-        """(nv, idle): generalised forces of a unit torque about the line of each idle freedom."""
+        """(nv, idle): generalised forces of a unit torque about the line of each local degree of freedom."""
         spins = np.zeros((tree.model.nv, len(tree.tree.idle)))
         for k, (body, axis) in enumerate(tree.tree.idle):
             spins[tree.platform[3:], k] = axis if body == PLATFORM else pose[:3, :3].T @ axis

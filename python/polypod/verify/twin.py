@@ -1,4 +1,4 @@
-"""What the twins have in common that are given forces and answer with accelerations."""
+"""Base class of forward-dynamics twins: forces in, accelerations out."""
 
 from __future__ import annotations
 

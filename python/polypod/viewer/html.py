@@ -106,7 +106,7 @@ def _screw(screw: Screw | None) -> str:
         return ""
     if math.isinf(screw.pitch):
         return "a translation"
-    return f"a turn about an axis, with {_fixed(1e3 * screw.pitch)} mm/rad along it"
+    return f"a rotation about an axis, with {_fixed(1e3 * screw.pitch)} mm/rad along it"
 
 
 def _range(name: str, low: float, high: float) -> dict[str, str]:

@@ -1,4 +1,4 @@
-"""What a page may send: values of its own controls, and nothing else; and from where."""
+"""Filter of a page's messages: values of its own controls, and nothing else; and their origin."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the page shows: the present pose and all that is told of it. Knows nothing of browsers."""
+"""Model of the page: the present pose and its results. Independent of browsers."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class Note:
 
 @dataclass(frozen=True)
 class Screw:
-    """A motion that the locked legs hardly resist, base axes: a turn about an axis, or a translation."""
+    """A motion that the locked legs hardly resist, base axes: a rotation about an axis, or a translation."""
 
     point: Array
     """(3,), m."""

@@ -1,4 +1,4 @@
-"""What the page shows on demand beside the machine: arrows, its workspace, its other assembly modes."""
+"""Overlays of the page beside the machine: arrows, its workspace, its other assembly modes."""
 
 from __future__ import annotations
 

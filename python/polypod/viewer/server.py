@@ -108,7 +108,7 @@ class Viewer:
             self._panel.show_ranges(self.model.singular_values(), self._usual_time())
 
     def _usual_time(self) -> float | None:
-        """What the last answers took, the median, s."""
+        """Median time of the last answers, s."""
         return median(self.durations[-30:]) if self._worker.durations else None
 
 

@@ -93,7 +93,7 @@ class Worker:
 
 
 def _guarded(action: Action) -> object:
-    """An action whose failure is told on the terminal, and does not end the thread."""
+    """An action whose failure is reported on the terminal, and does not end the thread."""
     try:
         return action()
     except Exception:

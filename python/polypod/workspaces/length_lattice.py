@@ -56,7 +56,7 @@ class LengthLattice:
     profile: Array
     """(k, 4): least and greatest x, then y, in each layer, m."""
     inputs: dict[str, Any]
-    """What it was made from."""
+    """Inputs from which it was made."""
 
     def __repr__(self) -> str:
         return "<{}; {}>".format(*self._heading())
@@ -72,7 +72,7 @@ class LengthLattice:
         return card(*self._heading(), [table], notes=notes)
 
     def _heading(self) -> tuple[str, str]:
-        """What it is, and how many nodes."""
+        """Kind of the lattice, and its number of nodes."""
         said = f"steps of {readable(self.step, 'm')}, {self.inside} of {self.nodes} combinations inside"
         return f"Lattice of leg lengths of {self.inputs['mechanism']}", f"{said}, {self.poses} poses"
 
@@ -102,7 +102,7 @@ class LengthLattice:
         return np.array([above[:, 1].max() - above[:, 0].min(), above[:, 3].max() - above[:, 2].min()])
 
     def facts(self) -> dict[str, Any]:
-        """What is worth telling, as plain data: SI."""
+        """Summary as plain data: SI."""
         return {
             "kind": "lattice",
             **self.inputs,
@@ -144,7 +144,7 @@ def length_lattice(
         progress: called with the number of nodes reached and of all.
 
     Raises:
-        UnsupportedError: an actuated leg without a stroke, or not as many of them as freedoms.
+        UnsupportedError: an actuated leg without a stroke, or not as many of them as degrees of freedom.
         WorkspaceError: a step or start that is wrong.
     """
     mech = with_floor(mech, sigma_min)
@@ -168,9 +168,9 @@ def length_lattice(
             )
     if int(mech.actuated.sum()) != mech.dof:
         raise UnsupportedError(
-            f"{mech.name}: a lattice of lengths needs as many actuated legs as freedoms: lengths of "
-            "redundant legs contradict one another at most nodes, and with an idle freedom poses differ by a "
-            "spin that lengths do not tell; workspace works with poses"
+            f"{mech.name}: a lattice of lengths needs as many actuated legs as degrees of freedom: lengths "
+            "of redundant legs contradict one another at most nodes, and with a local degree of freedom "
+            "poses differ by a spin that lengths do not determine; workspace works with poses"
         )
     step = float(widths.min() / DIVISIONS) if step is None else step
     layer = step if layer is None else layer

@@ -37,8 +37,8 @@ def workspace(
 
     A slice varies two or three coordinates over fixed others: x, y, z over given angles are the
     constant-orientation workspace, angles over a given position the orientation workspace. The names
-    are those of one coordinate set; or x, y, z of the tool tip with azimuth, tilt and (six freedoms)
-    torsion of the tool axis. It holds the connected part with the start, else the largest.
+    are those of one coordinate set; or x, y, z of the tool tip with azimuth, tilt and (six degrees of
+    freedom) torsion of the tool axis. It holds the connected part with the start, else the largest.
 
     Args:
         mech: the mechanism.

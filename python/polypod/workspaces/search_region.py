@@ -29,7 +29,7 @@ _CANDIDATES = 7
 """Places along each axis at which a start pose is looked for."""
 
 _TURN = 0.3
-"""Turn from home, rad, of the other rotations with which it is looked for."""
+"""Rotation from home, rad, of the other rotations with which it is looked for."""
 
 _FLAT = 0.05
 """Rails whose ends leave a plane by less than this part of their width lie in it."""
@@ -132,7 +132,7 @@ def bounds_of(
 
 
 def own_coordinates(mech: Mechanism) -> tuple[str, ...]:
-    """As many pose coordinates as there are freedoms: those that determine the others best at home."""
+    """As many pose coordinates as degrees of freedom: those that determine the others best at home."""
     return mech.equations_of_motion(mech.home, np.zeros(6), "pose").coordinates
 
 
@@ -228,7 +228,7 @@ def find_start(mech: Mechanism, bounds: Array, *, regular: bool) -> Array:
     """(4, 4): a pose inside all limits, o in the bounds (3, 2).
 
     The centre pose if it is such a one; else of those found at 7 x 7 x 7 places and home, with rotations next
-    to that of home and to six turned from it by 0.3 rad, the one farthest from its limits, relative to their
+    to that of home and to six rotated from it by 0.3 rad, the one farthest from its limits, relative to their
     scales. With `regular`, if the centre pose is nearly singular, the one that is conditioned best.
 
     Raises WorkspaceError where none is found.
@@ -265,7 +265,7 @@ def find_start(mech: Mechanism, bounds: Array, *, regular: bool) -> Array:
 
 
 def _turned(axis: int, angle: float) -> Array:
-    """The turn by an angle about a base axis."""
+    """The rotation by an angle about a base axis."""
     from scipy.spatial.transform import Rotation
 
     return np.asarray(Rotation.from_euler("xyz"[axis], angle).as_matrix())

@@ -36,7 +36,7 @@ Without a step the grid is laid again about what the first found, until that is 
 """
 
 TILT = ("x", "y", "z", "azimuth", "tilt", "torsion")
-"""Position of the tool tip, direction of the tool axis in spherical angles, turn about it [T42]."""
+"""Position of the tool tip, direction of the tool axis in spherical angles, rotation about it [T42]."""
 
 _MARGIN = 3.5
 """Cells that are at least added to what a first grid found."""
@@ -52,7 +52,7 @@ _BISECTIONS = 36
 
 
 class _Judged(NamedTuple):
-    """What states of a slice are."""
+    """States of the nodes of a slice."""
 
     pose: Array
     """(n, 4, 4)."""
@@ -173,7 +173,7 @@ def _check_names(mech: Mechanism, vary: tuple[str, ...], fix: Mapping[str, float
         mech._set_of(dict.fromkeys((*vary, *fix), 0.0))
         return False
     if "tool" not in mech.coordinate_sets:
-        raise CoordinateError(f"{mech.name} has no tool axis to tilt: that needs 5 or 6 freedoms")
+        raise CoordinateError(f"{mech.name} has no tool axis to tilt: that needs 5 or 6 degrees of freedom")
     needed = TILT[: mech.dof]
     if names != {*needed}:
         wrong = [n for n in (*vary, *fix) if n not in needed]

@@ -31,7 +31,7 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 SINGULARITY, EDGE_OF_GRID, NO_POSE = "singularity", "edge of grid", "no pose"
-"""What ends a workspace where it is no limit.
+"""Causes of a workspace's boundary other than limits.
 
 Beyond, the sign of det J changes; the grid ends; no pose was found.
 """
@@ -75,7 +75,7 @@ class Workspace:
     volume_error: float
     """Its estimated error [T43]."""
     inputs: dict[str, Any]
-    """What it was made from: mechanism, bounds, step, start and the rest."""
+    """Inputs: mechanism, bounds, step, start and the rest."""
 
     @property
     def units(self) -> tuple[str, ...]:
@@ -95,7 +95,7 @@ class Workspace:
 
     @cached_property
     def shares(self) -> dict[str, float]:
-        """What ends the workspace, and at which part of the boundary's vertices, most first."""
+        """Causes of the boundary, with their shares of its vertices, most first."""
         counts = np.bincount(self.labels, minlength=len(self.label_names))
         order = np.argsort(-counts, kind="stable")
         return {self.label_names[i]: float(counts[i] / len(self.labels)) for i in order if counts[i]}
@@ -116,7 +116,7 @@ class Workspace:
         return mesh
 
     def facts(self) -> dict[str, Any]:
-        """What is worth telling, as plain data: SI, rad."""
+        """Summary as plain data: SI, rad."""
         inputs = {name: value for name, value in self.inputs.items() if name != "mechanism_file"}
         return {
             "kind": self.kind,
@@ -178,7 +178,7 @@ class Workspace:
         )
 
     def _heading(self) -> tuple[str, str]:
-        """What it is, and how large."""
+        """Kind and size of the workspace."""
         fixed = self.inputs.get("fixed") or {}
         at = ", ".join(f"{name} = {readable(value, coordinate_unit(name))}" for name, value in fixed.items())
         size = f"{number(self.volume)} ± {self.volume_error:.1g} {self.volume_unit}"
@@ -342,7 +342,7 @@ def enclosed(
 
 
 def label_names(mech: Mechanism) -> tuple[str, ...]:
-    """What may end a workspace of the mechanism."""
+    """Possible causes of a workspace's boundary."""
     return (*(limit.name for limit in mech.limit_list), SINGULARITY, EDGE_OF_GRID, NO_POSE)
 
 

@@ -1,4 +1,4 @@
-//! From the description of a mechanism to the mechanism: what its parts must be to each other is checked here, on all
+//! Construction of a mechanism from its description. Relations between the parts are checked here, on all
 //! parts that could be read, and every fault is reported at once.
 
 use crate::assembly::drives;
@@ -53,7 +53,7 @@ pub fn assemble(spec: &Spec) -> Result<Mechanism, Vec<Fault>> {
     if faults.is_empty() { Ok(mech) } else { Err(faults) }
 }
 
-/// The mechanism without what only ranks tell.
+/// The mechanism without its mobility, which needs ranks.
 fn build(spec: &Spec, home: Pose<f64>) -> Mechanism {
     let rods: Vec<Rod> =
         spec.rods.iter().flatten().enumerate().map(|(i, rod)| make_rod(spec, i, rod)).collect();
@@ -110,26 +110,28 @@ fn check_home(mech: &Mechanism) -> Vec<Fault> {
         .collect()
 }
 
-/// Whether actuators can control the freedoms, and whether the two ways to count freedoms agree.
+/// Whether actuators can control the degrees of freedom, and whether the two ways to count degrees of freedom
+/// agree.
 fn check_freedoms(mech: &Mechanism) -> Option<Fault> {
     let (actuators, dof) = (mech.actuated().count(), mech.dof());
     let Mobility { joint_freedoms, closure_rank, passive, .. } = mech.mobility;
     if joint_freedoms != closure_rank + dof + passive {
         let message = format!(
-            "its constraints leave {dof} freedoms, but its loop closures {joint_freedoms} - {closure_rank} - {passive}; \
-             this combination of joints is not modelled"
+            "its constraints leave {dof} degrees of freedom, but its loop closures {joint_freedoms} - {closure_rank} - \
+             {passive}; this combination of joints is not modelled"
         );
         return Some(Fault::new("mechanism", message));
     }
     let idle = mech.idle.len();
     if dof == 0 {
-        return Some(Fault::new("legs", "together they leave the platform no freedom; release a joint"));
+        let message = "together they leave the platform no degree of freedom; release a joint";
+        return Some(Fault::new("legs", message));
     }
     if idle == dof {
         let all = if dof == 1 {
-            "the one freedom of the platform is".to_owned()
+            "the one degree of freedom of the platform is".to_owned()
         } else {
-            format!("all {dof} freedoms of the platform are")
+            format!("all {dof} degrees of freedom of the platform are")
         };
         let message = format!("{all} idle, so that no leg moves it; move a joint off the others");
         return Some(Fault::new("legs", message));
@@ -141,12 +143,13 @@ fn check_freedoms(mech: &Mechanism) -> Option<Fault> {
     };
     let needed = dof - idle;
     let message = format!(
-        "{actuators} actuated legs for {dof} freedoms{apart}; at least {needed} legs must be actuated"
+        "{actuators} actuated legs for {dof} degrees of freedom{apart}; at least {needed} legs must be \
+         actuated"
     );
     (actuators < needed).then(|| Fault::new("legs", message))
 }
 
-/// What parts must be to each other.
+/// Faults in the relations between parts.
 fn check_relations(spec: &Spec, home: Option<&Pose<f64>>) -> Vec<Fault> {
     let mut faults = check_rods(spec);
     faults.extend(check_ends(spec));
@@ -187,7 +190,7 @@ fn check_rods(spec: &Spec) -> Vec<Fault> {
             if leg.base.axis.is_some() {
                 faults.push(Fault::new(
                     format!("legs.{}.base.axis", j + 1),
-                    "an R joint on a rod is square to the rod and to the leg; give no axis",
+                    "an R joint on a rod is perpendicular to the rod and to the leg; give no axis",
                 ));
             }
         }
@@ -280,9 +283,9 @@ fn home_message(mech: &Mechanism, c: &Constraint, missed: f64) -> String {
         ConstraintKind::A => {
             "the leg, its axis in the base and its axis in the platform must lie in one plane"
         }
-        ConstraintKind::B => "the leg must be square to its axis in the base",
-        ConstraintKind::C => "the leg must be square to its axis in the platform",
-        ConstraintKind::D => "its axis in the base must be square to its axis in the platform",
+        ConstraintKind::B => "the leg must be perpendicular to its axis in the base",
+        ConstraintKind::C => "the leg must be perpendicular to its axis in the platform",
+        ConstraintKind::D => "its axis in the base must be perpendicular to its axis in the platform",
         ConstraintKind::E => "legs on one rod must keep the angle between their planes",
     };
     let off = match c.kind {
@@ -344,7 +347,8 @@ fn make_joint(spec: &JointSpec, direction: Vec3<f64>) -> Joint {
     }
 }
 
-/// What gives a leg its normal: its joint on the base, else that on the platform; none for S at both ends.
+/// Joint axis that determines a leg's normal: its joint on the base, else that on the platform; none for S at
+/// both ends.
 pub(crate) fn turning<S: Scalar>(base: &Joint<S>, platform: &Joint<S>) -> Option<Turning<S>> {
     turning_of(base, Axes::Base).or_else(|| turning_of(platform, Axes::Platform))
 }

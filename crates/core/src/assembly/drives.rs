@@ -16,8 +16,8 @@ pub(super) fn make(leg: &LegSpec) -> Drive {
     }
 }
 
-/// The body of the first link where it has a description of its own: a carriage, which does not turn, so that its inertia is of
-/// no effect.
+/// The body of the first link where it has a description of its own: a carriage, which does not rotate, so
+/// that its inertia is of no effect.
 pub(super) fn own_body(leg: &LegSpec) -> Option<Body> {
     let carriage = leg.slider.as_ref()?.carriage.as_ref();
     Some(carriage.map_or(Body::NONE, |c| Body { mass: c.mass, center: c.center, ..Body::NONE }))
@@ -36,7 +36,7 @@ fn on_rail(slider: &SliderSpec, r: Vec3<f64>) -> Result<Vec3<f64>, String> {
     if !(ahead > ANGLE_TOLERANCE * strut) {
         return Err(format!(
             "is {strut} m; the platform point is {far:.6} m from the rail at the home pose, which the strut must exceed: \
-             square to its rail it is singular"
+             perpendicular to its rail it is singular"
         ));
     }
     Ok(across + axis * (slider.branch * ahead))
@@ -67,13 +67,13 @@ fn check_joints(place: &str, leg: &LegSpec, slider: &SliderSpec) -> Vec<Fault> {
     let (above, below) = (leg.platform.joint, leg.base.joint);
     match (below.normal(), above.normal()) {
         _ if below.is_fixed() => {
-            let message = "is F; the strut must turn on its carriage: give S, U or R";
+            let message = "is F; the strut must rotate on its carriage: give S, U or R";
             faults.push(Fault::new(format!("{place}.base.joint"), message));
         }
         (Some(Normal::Along(())), _) if !square => {
             faults.push(Fault::new(
                 format!("{place}.base.axis"),
-                "must be square to the rail: R on a carriage",
+                "must be perpendicular to the rail: R on a carriage",
             ));
         }
         (Some(Normal::Across(())), Some(Normal::Across(()))) if !along => {

@@ -1,4 +1,5 @@
-//! The numbers of the geometry: points and axes of joints and rods; and mechanisms that vary with one of them \[T56\].
+//! Geometric parameters: points and axes of joints and rods; and mechanisms that vary with one of them, by
+//! dual numbers \[T56\].
 
 use crate::assembly::build;
 use crate::kinematics::idle;
@@ -9,9 +10,9 @@ use crate::model::spec::Axes;
 use crate::number::real::Dual;
 use crate::spatial::Vec3;
 
-/// What has points and axes.
+/// Owner of points and axes: a rod, or a joint of a leg.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Place {
+pub enum ParameterSite {
     Joint(usize, Axes),
     /// A leg's drive, and which of its parts.
     Drive(usize, usize),
@@ -20,24 +21,24 @@ pub enum Place {
 
 /// One component of a point or an axis, in the axes of its body.
 #[derive(Clone, Copy, Debug)]
-pub struct Parameter {
-    pub place: Place,
+pub struct GeometricParameter {
+    pub place: ParameterSite,
     pub vector: Vector,
     pub component: usize,
 }
 
-impl Parameter {
+impl GeometricParameter {
     /// `leg 1 base point_x`, `leg 1 rail axis_x`, `leg 1 strut length`, `rod L axis_z`.
     #[must_use]
     pub fn name(&self, mech: &Mechanism) -> String {
         let place = match self.place {
-            Place::Joint(i, Axes::Base) => format!("leg {} base", mech.legs[i].name),
-            Place::Joint(i, Axes::Platform) => format!("leg {} platform", mech.legs[i].name),
-            Place::Drive(i, part) => {
+            ParameterSite::Joint(i, Axes::Base) => format!("leg {} base", mech.legs[i].name),
+            ParameterSite::Joint(i, Axes::Platform) => format!("leg {} platform", mech.legs[i].name),
+            ParameterSite::Drive(i, part) => {
                 let Leg { name, drive, .. } = &mech.legs[i];
                 format!("leg {name} {}", drive.kind().parts[part].name)
             }
-            Place::Rod(i) => format!("rod {}", mech.rods[i].name),
+            ParameterSite::Rod(i) => format!("rod {}", mech.rods[i].name),
         };
         let vector = match self.vector {
             Vector::Point => "point",
@@ -52,24 +53,28 @@ impl Parameter {
 /// All of them in order: base joint and platform joint of each leg and the parts of its drive, as rail and strut; rods.
 /// A leg on a rod has the rod's axis, no own.
 #[must_use]
-pub fn parameters(mech: &Mechanism) -> Vec<Parameter> {
+pub fn parameters(mech: &Mechanism) -> Vec<GeometricParameter> {
     let joints = mech.legs.iter().enumerate().flat_map(|(i, leg)| {
         let of_joint = move |(side, joint, rod): (Axes, &Joint, Option<usize>)| {
             let (axis, normal) = (joint.kind.has_axis() && rod.is_none(), joint.kind.has_normal());
             let own = [axis.then_some(Vector::Axis), normal.then_some(Vector::Normal)];
-            [Some(Vector::Point)].into_iter().chain(own).flatten().map(move |v| (Place::Joint(i, side), v))
+            [Some(Vector::Point)]
+                .into_iter()
+                .chain(own)
+                .flatten()
+                .map(move |v| (ParameterSite::Joint(i, side), v))
         };
         let joints = [(Axes::Base, &leg.base, leg.rod), (Axes::Platform, &leg.platform, None)];
         let parts = leg.drive.kind().parts.iter().enumerate();
-        let drive = parts.map(move |(k, part)| (Place::Drive(i, k), part.vector));
+        let drive = parts.map(move |(k, part)| (ParameterSite::Drive(i, k), part.vector));
         joints.into_iter().flat_map(of_joint).chain(drive)
     });
-    let of_rod = |i: usize| [Vector::Point, Vector::Axis].map(|vector| (Place::Rod(i), vector));
+    let of_rod = |i: usize| [Vector::Point, Vector::Axis].map(|vector| (ParameterSite::Rod(i), vector));
     let vectors = joints.chain((0..mech.rods.len()).flat_map(of_rod));
     let count = |vector: Vector| if vector == Vector::Length { 1 } else { 3 };
     vectors
         .flat_map(|(place, vector)| {
-            (0..count(vector)).map(move |component| Parameter { place, vector, component })
+            (0..count(vector)).map(move |component| GeometricParameter { place, vector, component })
         })
         .collect()
 }
@@ -77,15 +82,15 @@ pub fn parameters(mech: &Mechanism) -> Vec<Parameter> {
 /// The mechanism with the derivative of all its parts by one of its numbers, zero for none. The home pose is kept, and with
 /// it the angle between legs on one rod.
 #[must_use]
-pub fn varied(mech: &Mechanism, by: Option<&Parameter>) -> Mechanism<Dual<f64>> {
-    let lift = |place: Place, vector: Vector, a: Vec3<f64>| -> Vec3<Dual<f64>> {
+pub fn varied(mech: &Mechanism, by: Option<&GeometricParameter>) -> Mechanism<Dual<f64>> {
+    let lift = |place: ParameterSite, vector: Vector, a: Vec3<f64>| -> Vec3<Dual<f64>> {
         let Some(by) = by.filter(|by| (place, vector) == (by.place, by.vector)) else {
             return Vec3::lift(a);
         };
         let step = [Vec3::X, Vec3::Y, Vec3::Z][by.component];
         a.with_rate(if vector == Vector::Point { step } else { step - a * a.dot(step) })
     };
-    let joint = |place: Place, joint: &Joint| Joint {
+    let joint = |place: ParameterSite, joint: &Joint| Joint {
         kind: joint.kind,
         point: lift(place, Vector::Point, joint.point),
         axis: joint.axis.map(|a| lift(place, Vector::Axis, a)),
@@ -94,23 +99,23 @@ pub fn varied(mech: &Mechanism, by: Option<&Parameter>) -> Mechanism<Dual<f64>> 
     };
     let rod = |(i, rod): (usize, &Rod)| Rod {
         name: rod.name.clone(),
-        point: lift(Place::Rod(i), Vector::Point, rod.point),
-        axis: lift(Place::Rod(i), Vector::Axis, rod.axis),
+        point: lift(ParameterSite::Rod(i), Vector::Point, rod.point),
+        axis: lift(ParameterSite::Rod(i), Vector::Axis, rod.axis),
         body: rod.body.clone(),
         leader: rod.leader,
     };
     let rods: Vec<_> = mech.rods.iter().enumerate().map(rod).collect();
     let leg = |(i, leg): (usize, &Leg)| {
-        let mut base = joint(Place::Joint(i, Axes::Base), &leg.base);
+        let mut base = joint(ParameterSite::Joint(i, Axes::Base), &leg.base);
         if let Some(rod) = leg.rod {
             base.axis = Some(rods[rod].axis);
         }
-        let platform = joint(Place::Joint(i, Axes::Platform), &leg.platform);
+        let platform = joint(ParameterSite::Joint(i, Axes::Platform), &leg.platform);
         let turning = build::turning(&base, &platform);
         let drive = leg.drive.with(
-            |part, axis| lift(Place::Drive(i, part), Vector::Axis, axis),
+            |part, axis| lift(ParameterSite::Drive(i, part), Vector::Axis, axis),
             |part, length| {
-                let varies = by.is_some_and(|by| by.place == Place::Drive(i, part));
+                let varies = by.is_some_and(|by| by.place == ParameterSite::Drive(i, part));
                 Dual::new(length, f64::from(u8::from(varies)))
             },
         );

@@ -1,4 +1,4 @@
-//! Many states in blocks: what an operation does with one state, it does with one in each lane \[T65\].
+//! Blocks of states: an operation on one state, done on one in each lane \[T65\].
 //!
 //! Answers are written into rows, one number of each state side by side, and copied from there into arrays, one state
 //! after the other. So the memory is that of input and output and of one block for each thread, and no state allocates.
@@ -23,15 +23,15 @@ const PARTS: usize = 4;
 /// A table of so many numbers, eight megabytes, is written past the caches.
 const STREAMED: usize = 1 << 20;
 
-/// What is done with states side by side. `N` arrays are answered.
+/// An operation on states side by side, with `N` result arrays.
 pub(super) trait Operation<const N: usize>: Sync {
-    /// Puts the answers for the states at a place; of states whose status does not stand they are not read.
+    /// Writes the results of the states at an index; of states whose status does not stand they are not read.
     ///
     /// Must be `#[inline(always)]`, with all that it calls.
     fn run<V: Lanes>(&self, at: At, answers: &mut Answers<'_, N>) -> Codes<V>;
 }
 
-/// The same in room that is made once for many blocks, so that no state allocates.
+/// An operation with a workspace that is allocated once for many blocks, so that no state allocates.
 pub(super) trait Working<const N: usize>: Sync {
     type Room<V: Lanes>;
 
@@ -71,7 +71,7 @@ impl<V: Lanes> Codes<V> {
         self.or(holds, f64::from(status as u8))
     }
 
-    /// The same for a status with which the numbers are answered all the same.
+    /// Sets a status that keeps the numbers, where the condition fails.
     #[must_use]
     #[inline(always)]
     pub(super) fn but(self, holds: V::Mask, status: Status) -> Self {
@@ -91,7 +91,7 @@ impl<V: Lanes> Codes<V> {
         Codes(V::select(self.are(Status::Ok), next.0, self.0))
     }
 
-    /// The same with numbers answered all the same.
+    /// Codes with the numbers kept.
     #[must_use]
     #[inline(always)]
     pub(super) fn answered(self) -> Self {
@@ -103,7 +103,7 @@ impl<V: Lanes> Codes<V> {
         self.0.store(to);
     }
 
-    /// Where the status is this one.
+    /// Mask of the lanes with this status.
     #[inline(always)]
     pub(super) fn are(self, status: Status) -> V::Mask {
         (self.0.abs() - V::lit(f64::from(status as u8))).abs().at_most(V::zero())
@@ -122,7 +122,7 @@ impl Codes<f64> {
     }
 }
 
-/// Where the states of the lanes are in the arrays. Lanes beyond the last state repeat it.
+/// Indices of the lanes' states in the arrays. Lanes beyond the last state repeat it.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct At {
     first: usize,
@@ -156,7 +156,7 @@ impl At {
         read
     }
 
-    /// The same, zeros if there are none at all.
+    /// Values of the states, zeros if the array is empty.
     #[inline(always)]
     pub(super) fn read_or_zero<V: Lanes, const N: usize>(self, values: &[f64]) -> [V; N] {
         if values.is_empty() { [V::zero(); N] } else { self.read(values) }
@@ -229,7 +229,7 @@ pub(super) fn table<const N: usize>(
     })
 }
 
-/// How states are shared out: pieces of this many at least, a multiple of the unit.
+/// Partition of the states: pieces of at least this many, a multiple of the unit.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Pieces {
     pub least: usize,
@@ -263,7 +263,7 @@ pub(super) fn one_by_one<const N: usize>(
     })
 }
 
-/// The same for a function that works through a piece of the states, with whatever room it makes for itself.
+/// Table of a function that works through a piece of the states, with its own workspace.
 pub(super) fn in_pieces<const N: usize>(
     states: usize,
     fields: [(&'static str, Vec<usize>); N],
@@ -277,7 +277,7 @@ pub(super) fn in_pieces<const N: usize>(
     })
 }
 
-/// What a function answers for each of so many states that take a millisecond each.
+/// Results of a function for each state, for operations that take about a millisecond each.
 pub(super) fn each<R: Send>(states: usize, answer: impl Fn(usize) -> R + Sync) -> Vec<R> {
     let mut found = Vec::new();
     if states > 1 && threads::count() > 1 {

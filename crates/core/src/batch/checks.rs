@@ -1,14 +1,14 @@
-//! Whether a state is one that the mechanism can be in: the checks that every operation makes of its input.
+//! Checks that every operation makes of its input: pose, legs, limits, constraints, motion.
 
 use super::block::{self, At, Codes};
 use crate::dynamics::forward_dynamics::square;
 use crate::kinematics::constraint;
 use crate::kinematics::leg::{self, Position};
-use crate::limits::margins::Seen;
+use crate::limits::margins::LegCache;
 use crate::model::limit::Limit;
 use crate::model::mechanism::{Constraint, Leg, Mechanism, Turning};
 use crate::model::status::Status;
-use crate::number::lanes::{self, Lanes, Row, Task, WIDTH};
+use crate::number::lanes::{self, Lanes, Row, Task, WIDTH, work};
 use crate::number::real::{Ordered, Real};
 use crate::spatial::{Mat3, Motion, Pose, Twist, Vec3};
 
@@ -84,16 +84,24 @@ pub(super) fn read_pose(mech: &Mechanism, poses: &[f64], i: usize) -> (Pose<f64>
 
 /// Whether every leg has a direction and a frame: no length of zero, no axis of a universal joint (or rod) along it.
 #[inline(always)]
-pub(super) fn with_legs<V: Lanes>(mech: &Mechanism, pose: &Pose<V>, mut codes: Codes<V>) -> Codes<V> {
-    for leg in &mech.legs {
-        let p = leg::position(leg, pose);
-        let normal = leg::normal(leg, pose, &p);
-        codes = with_leg(mech, leg, &p, normal.dot(normal), codes);
-    }
-    codes
+pub(super) fn with_legs<V: Lanes>(mech: &Mechanism, pose: &Pose<V>, codes: Codes<V>) -> Codes<V> {
+    V::apart(WithLegs { mech, pose, codes })
 }
 
-/// The same of one leg, from |N|² \[T5\]; and whether the strut of a slider reaches its rail, not square to it \[T67\].
+work! {
+    WithLegs<'a, V> { mech: &'a Mechanism, pose: &'a Pose<V>, codes: Codes<V> } -> Codes<V> {
+        let mut codes = codes;
+        for leg in &mech.legs {
+            let p = leg::position(leg, pose);
+            let normal = leg::normal(leg, pose, &p);
+            codes = with_leg(mech, leg, &p, normal.dot(normal), codes);
+        }
+        codes
+    }
+}
+
+/// Whether one leg has a direction and a frame, from |N|² \[T5\], and the strut of a slider reaches its rail,
+/// not perpendicular to it \[T67\].
 #[inline(always)]
 pub(super) fn with_leg<V: Lanes>(
     mech: &Mechanism,
@@ -162,7 +170,7 @@ pub(super) fn forwards<V: Lanes>(mech: &Mechanism, pose: &Pose<V>, mut codes: Co
     codes
 }
 
-/// The same for values, which are lengths; a row that vanishes gives no distance.
+/// Square of the tolerance for constraint values, which are lengths; a row that vanishes gives no distance.
 #[inline(always)]
 fn nearness<V: Lanes>(mech: &Mechanism, square: V) -> V {
     let least = constraint::VANISHING_ROW * CONSTRAINT_TOLERANCE;
@@ -190,6 +198,17 @@ pub(super) fn with_twist<V: Lanes>(
 /// Whether pose, twist and acceleration keep the constraints, `g = ġ = g̈ = 0` \[T65\], with no leg backwards.
 #[inline(always)]
 pub(super) fn with_motion<V: Lanes>(mech: &Mechanism, platform: &Motion<V>, codes: Codes<V>) -> Codes<V> {
+    V::apart(WithMotion { mech, platform, codes })
+}
+
+work! {
+    WithMotion<'a, V> { mech: &'a Mechanism, platform: &'a Motion<V>, codes: Codes<V> } -> Codes<V> {
+        kept_by_motion(mech, platform, codes)
+    }
+}
+
+#[inline(always)]
+fn kept_by_motion<V: Lanes>(mech: &Mechanism, platform: &Motion<V>, codes: Codes<V>) -> Codes<V> {
     let Motion { pose, twist, acceleration } = platform;
     let second = Twist::new(acceleration.a, acceleration.eps);
     let (scale, speed) = (mech.characteristic_length, square(mech, twist));
@@ -214,25 +233,38 @@ pub(super) fn then(first: Status, second: impl FnOnce() -> Status) -> Status {
 /// The first limit of a joint that a pose breaks.
 #[inline(always)]
 pub(super) fn within_limits<V: Lanes>(mech: &Mechanism, pose: &Pose<V>, codes: Codes<V>) -> Codes<V> {
-    within_limits_of(mech, pose, &mut Seen::default(), codes)
+    within_limits_of(mech, pose, &mut LegCache::default(), codes)
 }
 
-/// The same with what has been seen of the legs.
+/// First limit of a joint that a pose breaks, from the cached legs.
 #[inline(always)]
 pub(super) fn within_limits_of<V: Lanes>(
     mech: &Mechanism,
     pose: &Pose<V>,
-    seen: &mut Seen<V>,
-    mut codes: Codes<V>,
+    seen: &mut LegCache<V>,
+    codes: Codes<V>,
 ) -> Codes<V> {
-    for limit in joint_limits(mech) {
-        let margin = limit.bound.margin(limit.of_joint(mech, pose, seen));
-        codes = codes.unless(V::zero().at_most(margin), limit.status());
-    }
-    codes
+    V::apart(WithinLimits { mech, pose, seen, codes })
 }
 
-/// The same of one pose, in the registers of batches: lengths at the very end of a stroke are judged alike everywhere.
+work! {
+    WithinLimits<'a, V> {
+        mech: &'a Mechanism,
+        pose: &'a Pose<V>,
+        seen: &'a mut LegCache<V>,
+        codes: Codes<V>,
+    } -> Codes<V> {
+        let mut codes = codes;
+        for limit in joint_limits(mech) {
+            let margin = limit.bound.margin(limit.of_joint(mech, pose, seen));
+            codes = codes.unless(V::zero().at_most(margin), limit.status());
+        }
+        codes
+    }
+}
+
+/// Status of one pose by the limits of joints, in the registers of batches: lengths at the very end of a
+/// stroke are judged alike everywhere.
 pub(super) fn limit_status(mech: &Mechanism, pose: &Pose<f64>) -> Status {
     let mut codes = [0.0; WIDTH];
     lanes::dispatch(LimitsOfOne { mech, pose, codes: &mut codes });

@@ -5,11 +5,14 @@ use super::block::{self, Answers, At, Codes, Operation, Pieces};
 use super::checks::{
     check_legs, finite, forwards, is_rotation, pose_at, raw_pose, then, with_legs, with_motion,
 };
-use crate::kinematics::coordinate_sets::{self, Dependent, MAX_COORDINATES, Set, State, Values};
+use crate::kinematics::coordinate_sets::{
+    self, Conditions, CoordinateState, Dependent, MAX_COORDINATES, Set, Values,
+};
 use crate::model::mechanism::Mechanism;
 use crate::model::status::Status;
-use crate::number::lanes::Lanes;
-use crate::number::real::{Jet, Real};
+use crate::number::lanes::{Lanes, work};
+use crate::number::real::{Jet, Mask, Real};
+use crate::spatial::Motion;
 
 /// Given coordinates of the states with their rates and second rates: `given[k]` holds the three series of the
 /// `k`-th number of the set, or nothing where it is to be solved.
@@ -118,21 +121,15 @@ impl Operation<6> for FromCoordinates<'_> {
                 codes = codes.unless(finite(&[q[k].x, q[k].d, q[k].dd]), Status::InvalidInput);
             }
         }
-        let [pose, regular] = coordinate_sets::complete(mech, &input.set, &mut q, input.branch);
+        let [pose, regular] = V::apart(Complete { mech, set: &input.set, q: &mut q, branch: input.branch });
         codes = codes.unless(pose.0, pose.1).unless(regular.0, regular.1);
         if self.dependent.count > 0 && !matches!(input.set, Set::Paper(_)) {
             let wanted = codes.are(Status::Ok);
-            let ([found, regular], _) = coordinate_sets::solve_dependent(
-                mech,
-                &input.set,
-                &mut q,
-                &self.dependent,
-                &self.start,
-                wanted,
-            );
+            let (set, q, dependent, start) = (&input.set, &mut q, &self.dependent, &self.start);
+            let [found, regular] = V::apart(SolveDependent { mech, set, q, dependent, start, wanted });
             codes = codes.unless(found.0, found.1).unless(regular.0, regular.1);
         }
-        let platform = coordinate_sets::motion(&input.set.pose(mech, &q));
+        let platform = V::apart(MotionOf { mech, set: &input.set, q: &q });
         codes = with_legs(mech, &platform.pose, codes);
         codes = if self.all_given {
             with_motion(mech, &platform, codes)
@@ -179,8 +176,32 @@ impl Operation<6> for FromCoordinates<'_> {
     }
 }
 
+// Parts of the solution, each a function of its own.
+work! {
+    Complete<'a, V> { mech: &'a Mechanism, set: &'a Set, q: &'a mut Values<Jet<V>>, branch: f64 } -> Conditions<V> {
+        coordinate_sets::complete(mech, set, q, branch)
+    }
+}
+work! {
+    SolveDependent<'a, V> {
+        mech: &'a Mechanism,
+        set: &'a Set,
+        q: &'a mut Values<Jet<V>>,
+        dependent: &'a Dependent,
+        start: &'a Values<f64>,
+        wanted: Mask<V>,
+    } -> Conditions<V> {
+        coordinate_sets::solve_dependent(mech, set, q, dependent, start, wanted).0
+    }
+}
+work! {
+    MotionOf<'a, V> { mech: &'a Mechanism, set: &'a Set, q: &'a Values<Jet<V>> } -> Motion<V> {
+        coordinate_sets::motion(&set.pose(mech, q))
+    }
+}
+
 /// A state is none where a leg has no frame or points backwards, or where coordinates that were all given break the constraints.
-fn checked(mech: &Mechanism, mut state: State, all_given: bool) -> State {
+fn checked(mech: &Mechanism, mut state: CoordinateState, all_given: bool) -> CoordinateState {
     let pose = &state.platform.pose;
     // A root that a constraint has only because a leg has no frame there is none.
     state.status = then(state.status, || check_legs(mech, pose));

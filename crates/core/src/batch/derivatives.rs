@@ -4,7 +4,7 @@ use super::block::{self, Answers, At, Codes, Working};
 use super::checks::{solved, within_limits};
 use super::{FieldId, Loads, States, Table};
 use crate::assembly::geometric_parameters;
-use crate::dynamics::derivatives::{self, Coordinates, DIRECTIONS, Solved, Varied};
+use crate::dynamics::derivatives::{self, DIRECTIONS, SolvedDynamics, Varied, VariedCoordinates};
 use crate::dynamics::force_balance::UnitForceResponse;
 use crate::dynamics::inverse_dynamics::resultant;
 use crate::dynamics::regressor::{self, Regressor};
@@ -13,7 +13,8 @@ use crate::kinematics::leg;
 use crate::kinematics::rows::RowNumbers;
 use crate::model::mechanism::Mechanism;
 use crate::model::status::Status;
-use crate::number::lanes::Lanes;
+use crate::number::lanes::{Lanes, work};
+use crate::spatial::{Motion, Wrench};
 
 /// A field for the forces of all legs and one for the multipliers.
 type Pair = [FieldId; 2];
@@ -89,7 +90,7 @@ struct Derivatives<'a> {
 struct Room<V> {
     response: UnitForceResponse<V>,
     forces: Vec<V>,
-    legs: Vec<leg::State<V>>,
+    legs: Vec<leg::LegState<V>>,
     by_motion: Vec<V>,
     by_bodies: Vec<V>,
     column: Vec<V>,
@@ -132,7 +133,7 @@ impl Working<17> for Derivatives<'_> {
         }
         self.put_by_bodies(&state, legs, by_bodies, column, pair(&ids, 6), answers);
 
-        let by = Coordinates::at(mech, self.set, &self.still, self.given, &state.platform);
+        let by = VariedCoordinates::at(mech, self.set, &self.still, self.given, &state.platform);
         let determined = by.following.pivots.greater(V::lit(DEPENDENT_PIVOTS));
         let mut sum = V::zero();
         for (k, &number) in self.numbers.iter().enumerate() {
@@ -184,8 +185,8 @@ impl Derivatives<'_> {
     #[inline(always)]
     fn put_by_bodies<V: Lanes>(
         &self,
-        state: &Solved<V>,
-        legs: &mut Vec<leg::State<V>>,
+        state: &SolvedDynamics<V>,
+        legs: &mut Vec<leg::LegState<V>>,
         columns: &mut [V],
         column: &mut [V],
         fields: Pair,
@@ -194,7 +195,9 @@ impl Derivatives<'_> {
         let (mech, count) = (self.mech, self.regressor.parameters.len());
         set_legs(mech, state, legs);
         for (k, unit) in columns.chunks_exact_mut(column.len()).enumerate() {
-            state.response.put(self.regressor.wrench(mech, &state.platform, legs, k), &[], unit);
+            let wrench =
+                V::apart(UnitWrench { regressor: &self.regressor, mech, platform: &state.platform, legs, k });
+            state.response.put(wrench, &[], unit);
         }
         for k in 0..count {
             self.regressor.put_by_bodies(columns, k, column);
@@ -254,7 +257,8 @@ impl Working<4> for Regressors<'_> {
         set_legs(mech, &state, legs);
         let (platform, width) = (&state.platform, self.regressor.parameters.len());
         for k in 0..width {
-            state.response.put(self.regressor.wrench(mech, platform, legs, k), &[], column);
+            let wrench = V::apart(UnitWrench { regressor: &self.regressor, mech, platform, legs, k });
+            state.response.put(wrench, &[], column);
             put(mech, answers, [y, y_constraint], width, k, column);
         }
         let load = self.loads.of(mech, &platform.pose, at);
@@ -273,20 +277,45 @@ fn solve<'a, V: Lanes>(
     at: At,
     response: &'a mut UnitForceResponse<V>,
     forces: &'a mut [V],
-) -> (Solved<'a, V>, Codes<V>) {
+) -> (SolvedDynamics<'a, V>, Codes<V>) {
     let (platform, load, codes) = states.loaded_at(mech, loads, at);
     response.set(mech, &platform.pose);
-    let motion = response.balance(resultant(mech, &platform, load), forces);
+    let motion = response.balance(V::apart(Resultant { mech, platform: &platform, load }), forces);
     let codes = solved(mech, forces, response.regular, codes);
     let (load, numbers) = (loads.given(mech, at), RowNumbers::of(mech));
-    (Solved { platform, load, numbers, forces, motion, response }, codes)
+    (SolvedDynamics { platform, load, numbers, forces, motion, response }, codes)
 }
 
 #[inline(always)]
-fn set_legs<V: Lanes>(mech: &Mechanism, state: &Solved<V>, legs: &mut Vec<leg::State<V>>) {
-    legs.clear();
-    for leg in &mech.legs {
-        legs.push(leg::state(leg, &state.platform));
+fn set_legs<V: Lanes>(mech: &Mechanism, state: &SolvedDynamics<V>, legs: &mut Vec<leg::LegState<V>>) {
+    V::apart(SetLegs { mech, platform: &state.platform, legs });
+}
+
+work! {
+    SetLegs<'a, V> { mech: &'a Mechanism, platform: &'a Motion<V>, legs: &'a mut Vec<leg::LegState<V>> } -> () {
+        legs.clear();
+        for leg in &mech.legs {
+            legs.push(leg::state(leg, platform));
+        }
+    }
+}
+
+work! {
+    Resultant<'a, V> { mech: &'a Mechanism, platform: &'a Motion<V>, load: Wrench<V> } -> Wrench<V> {
+        resultant(mech, platform, load)
+    }
+}
+
+work! {
+    /// Wrench on the platform of a unit of the k-th parameter.
+    UnitWrench<'a, V> {
+        regressor: &'a Regressor,
+        mech: &'a Mechanism,
+        platform: &'a Motion<V>,
+        legs: &'a [leg::LegState<V>],
+        k: usize,
+    } -> Wrench<V> {
+        regressor.wrench(mech, platform, legs, k)
     }
 }
 

@@ -9,7 +9,7 @@ use crate::dynamics::force_balance::ForceSolver;
 use crate::dynamics::inverse_dynamics::{self, Balance};
 use crate::kinematics::leg;
 use crate::kinematics::rows;
-use crate::limits::margins::Seen;
+use crate::limits::margins::LegCache;
 use crate::mobility::degrees_of_freedom;
 use crate::model::mechanism::Mechanism;
 use crate::model::spec::Axes;
@@ -45,8 +45,9 @@ impl Loads<'_> {
     }
 }
 
-/// Active forces of all legs (zero for passive ones), multipliers of the independent constraints and torques of idle freedoms
-/// [Eq. 43] \[T70\]. Where actuators are redundant, the forces nearest to the preferred ones of all legs, zero for none \[T72\].
+/// Active forces of all legs (zero for passive ones), multipliers of the independent constraints and torques
+/// of local degrees of freedom [Eq. 43] \[T70\]. Where actuators are redundant, the forces nearest to the
+/// preferred ones of all legs, zero for none \[T72\].
 #[must_use]
 pub fn inverse_dynamics(
     mech: &Mechanism,
@@ -83,7 +84,7 @@ impl Working<3> for InverseDynamics<'_> {
         let (platform, codes) = self.states.platform(at);
         let (pose, load) = (&platform.pose, self.loads.of(mech, &platform.pose, at));
         let mut balance = Balance::new(mech, &platform, load);
-        let (mut legs, mut seen) = (Codes::ok(), Seen::default());
+        let (mut legs, mut seen) = (Codes::ok(), LegCache::default());
         for (k, leg) in mech.legs.iter().enumerate() {
             let place = leg::place(leg, pose);
             let (p, f) = &place;

@@ -5,10 +5,10 @@ use super::block::{self, Codes, Pieces, Rows};
 use super::checks::{actuated_values, forwards, is_rotation, joint_limits, raw_pose, then, with_legs};
 use crate::forward_kinematics::assembly_modes::{self, Start};
 use crate::forward_kinematics::gauss_newton;
-use crate::forward_kinematics::newton::{self, Asked, Found};
+use crate::forward_kinematics::newton::{self, FoundPose, LegTarget};
 use crate::forward_kinematics::newton_lanes::{self, put_numbers};
 use crate::kinematics::leg;
-use crate::limits::margins::Seen;
+use crate::limits::margins::LegCache;
 use crate::model::mechanism::Mechanism;
 use crate::model::status::Status;
 use crate::number::lanes::{self, Lanes, Row, Task, WIDTH};
@@ -99,7 +99,7 @@ pub fn forward_kinematics(
 }
 
 /// The pose with these lengths that belongs to a guess.
-fn found_near(mech: &Mechanism, lengths: &[f64], guess: &Pose<f64>) -> Found {
+fn found_near(mech: &Mechanism, lengths: &[f64], guess: &Pose<f64>) -> FoundPose {
     if gauss_newton::serves(mech) {
         gauss_newton::forward_kinematics(mech, lengths, guess)
     } else {
@@ -111,8 +111,8 @@ fn found_near(mech: &Mechanism, lengths: &[f64], guess: &Pose<f64>) -> Found {
 const IN_LANES: Pieces = Pieces { least: 32, unit: WIDTH };
 
 /// Writes down what was found, with its status.
-fn put_found(rows: &mut Rows<'_, 3>, i: usize, found: &Found, status: Status) {
-    let Found { pose, residual, iterations, .. } = *found;
+fn put_found(rows: &mut Rows<'_, 3>, i: usize, found: &FoundPose, status: Status) {
+    let FoundPose { pose, residual, iterations, .. } = *found;
     let [poses, residuals, counts] = block::fields();
     rows.set_status(i, status);
     let known = !matches!(status, Status::NotConverged | Status::InvalidInput);
@@ -130,7 +130,7 @@ fn check_found(mech: &Mechanism, asked: &[f64], pose: &Pose<f64>) -> Status {
     block::read(checks(mech, [(asked, pose)])[0]).0
 }
 
-/// The same of at most [`WIDTH`] lengths and poses, as codes.
+/// Status codes of at most [`WIDTH`] lengths and poses that were found for them.
 fn checks<'a>(mech: &Mechanism, found: impl IntoIterator<Item = (&'a [f64], &'a Pose<f64>)>) -> Row {
     let (mut poses, mut codes) = ([[0.0; WIDTH]; 12], [0.0; WIDTH]);
     let mut numbers = vec![[0.0; WIDTH]; mech.actuated().count()];
@@ -156,7 +156,7 @@ impl Task for Checks<'_> {
         while k < WIDTH {
             let pose = load::<V>(self.poses, k);
             let legs = self.numbers.iter().zip(mech.actuated());
-            let asked: Vec<_> = legs.map(|(row, (_, leg))| Asked::of(leg, V::load(&row[k..]))).collect();
+            let asked: Vec<_> = legs.map(|(row, (_, leg))| LegTarget::of(leg, V::load(&row[k..]))).collect();
             check(mech, &asked, &pose).store(&mut self.codes[k..]);
             k += V::WIDTH;
         }
@@ -166,7 +166,7 @@ impl Task for Checks<'_> {
 /// A root that a constraint has only because a leg has no frame there is none. Strokes are judged by the lengths
 /// that were asked for, which the pose's own miss by its error: lengths at the very end of a stroke are within it.
 #[inline(always)]
-fn check<V: Lanes>(mech: &Mechanism, asked: &[Asked<V>], pose: &Pose<V>) -> Codes<V> {
+fn check<V: Lanes>(mech: &Mechanism, asked: &[LegTarget<V>], pose: &Pose<V>) -> Codes<V> {
     let missed = newton::error(mech, asked, pose);
     let codes = forwards(mech, pose, with_legs(mech, pose, Codes::ok()));
     within_limits_missed(mech, pose, missed, on_branch(mech, asked, pose, codes))
@@ -180,7 +180,7 @@ fn within_limits_missed<V: Lanes>(
     missed: V,
     mut codes: Codes<V>,
 ) -> Codes<V> {
-    let mut seen = Seen::default();
+    let mut seen = LegCache::default();
     for limit in joint_limits(mech) {
         let mut margin = limit.bound.margin(limit.of_joint(mech, pose, &mut seen));
         if limit.status() == Status::OutOfStroke {
@@ -196,7 +196,7 @@ fn within_limits_missed<V: Lanes>(
 #[inline(always)]
 fn on_branch<V: Lanes>(
     mech: &Mechanism,
-    asked: &[Asked<V>],
+    asked: &[LegTarget<V>],
     pose: &Pose<V>,
     mut codes: Codes<V>,
 ) -> Codes<V> {

@@ -9,7 +9,7 @@ use super::{FieldId, Table};
 use crate::dynamics::forward_dynamics::{self, Equations};
 use crate::kinematics::coordinate_sets::Set;
 use crate::kinematics::leg;
-use crate::mobility::singularity_distance::{self, Search};
+use crate::mobility::singularity_distance::{self, SingularitySearch};
 use crate::model::mechanism::Mechanism;
 use crate::model::status::Status;
 use crate::number::lanes::Lanes;
@@ -76,7 +76,7 @@ impl Working<2> for ForwardDynamics<'_> {
     }
 }
 
-/// What the equations of motion are written in: twists, or given coordinates of a set.
+/// Velocities of the equations of motion: twists, or rates of given coordinates of a set.
 #[derive(Clone, Debug)]
 pub enum Space {
     Platform,
@@ -127,8 +127,12 @@ fn equations(
     match space {
         Space::Platform => Ok((forward_dynamics::platform_equations(mech, pose, twist), twist.array())),
         Space::Coordinates(set, given) => {
-            let search =
-                Search { set: **set, given: given.clone(), reach: 0.0, scale: mech.characteristic_length };
+            let search = SingularitySearch {
+                set: **set,
+                given: given.clone(),
+                reach: 0.0,
+                scale: mech.characteristic_length,
+            };
             let (q, branch) = singularity_distance::start(mech, &search, pose)?;
             forward_dynamics::coordinate_equations(mech, set, given, (&q, branch), pose, twist)
         }

@@ -10,7 +10,7 @@ use crate::kinematics::jacobian::MotionSolver;
 use crate::kinematics::leg;
 use crate::kinematics::passive_joints;
 use crate::kinematics::rows;
-use crate::limits::margins::Seen;
+use crate::limits::margins::LegCache;
 use crate::model::limit::Zero;
 use crate::model::mechanism::Mechanism;
 use crate::model::status::Status;
@@ -35,7 +35,7 @@ impl Operation<3> for InverseKinematics<'_> {
     fn run<V: Lanes>(&self, at: At, answers: &mut Answers<'_, 3>) -> Codes<V> {
         let (mech, [lengths, vectors, directions]) = (self.mech, Answers::fields());
         let (pose, mut codes) = any_pose(self.poses, at);
-        let mut seen = Seen::default();
+        let mut seen = LegCache::default();
         for (k, leg) in mech.legs.iter().enumerate() {
             let p = leg::position(leg, &pose);
             let normal = leg::normal(leg, &pose, &p);
@@ -141,10 +141,10 @@ impl Operation<21> for Kinematics<'_> {
     fn run<V: Lanes>(&self, at: At, answers: &mut Answers<'_, 21>) -> Codes<V> {
         let mech = self.mech;
         let (platform, codes) = self.states.platform(at);
-        let (mut legs, mut seen) = (Codes::ok(), Seen::default());
+        let (mut legs, mut seen) = (Codes::ok(), LegCache::default());
         for (k, (leg, zero)) in mech.legs.iter().zip(self.zeros).enumerate() {
             let state = leg::state(leg, &platform);
-            let leg::State { position: p, end, turn, frame } = &state;
+            let leg::LegState { position: p, end, turn, frame } = &state;
             legs = with_leg(mech, leg, p, frame.sine * frame.sine, legs);
             seen.next(p);
             let (piston, cylinder) = (leg::piston(leg, &state), leg::cylinder(leg, &state));

@@ -5,7 +5,7 @@ use super::checks::solved;
 use super::dynamics::Loads;
 use super::{States, Table};
 use crate::dynamics::force_balance::ForceSolver;
-use crate::limits::margins::{Binding, Seen};
+use crate::limits::margins::{Binding, LegCache};
 use crate::model::limit::Measure;
 use crate::model::mechanism::Mechanism;
 use crate::model::status::Status;
@@ -50,7 +50,7 @@ impl Working<4> for Limits<'_> {
             }
             codes = codes.but(determined, Status::Singular);
         }
-        let (mut seen, mut binds, mut kept) = (Seen::default(), Binding::default(), V::one());
+        let (mut seen, mut binds, mut kept) = (LegCache::default(), Binding::default(), V::one());
         for (k, limit) in mech.limits.iter().enumerate() {
             let margin = limit.margin_at(mech, &platform.pose, &room.forces, &mut seen);
             let relative = margin / V::lit(limit.scale);

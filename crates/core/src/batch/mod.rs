@@ -98,7 +98,7 @@ impl States<'_> {
         (platform, with_motion(mech, &platform, codes))
     }
 
-    /// The same with the load at them.
+    /// Motion of the states, with the load on the platform.
     #[inline(always)]
     fn loaded_at<V: Lanes>(
         &self,

@@ -4,15 +4,15 @@ use super::block::{self, Answers, At, Codes, Working};
 use super::checks::within_limits;
 use super::dynamics::Loads;
 use super::{States, Table};
-use crate::dynamics::joint_reactions::{self, Joint};
+use crate::dynamics::joint_reactions::{self, LinkJoint};
 use crate::dynamics::self_stress::Solver;
 use crate::model::mechanism::Mechanism;
 use crate::model::status::Status;
 use crate::number::lanes::Lanes;
 
-/// Reactions of all joints on the links on their platform's side, each at its joint's point \[T44\]-\[T48\], in the order of
-/// [`joint_reactions::joints`]. Which components are determinate is told by 1 and 0. `scale`, m, is what torques are divided by
-/// where the least sum of squares is sought.
+/// Reactions of all joints on the links on their platform's side, each at its joint's point \[T44\]-\[T48\],
+/// in the order of [`joint_reactions::joints`]. Which components are determinate is given by 1 and 0.
+/// `scale`, m, is what torques are divided by where the least sum of squares is sought.
 #[must_use]
 pub fn joint_reactions(mech: &Mechanism, states: &States, loads: &Loads, scale: f64) -> Table {
     let joints = joint_reactions::joints(mech);
@@ -35,7 +35,7 @@ pub fn joint_reactions(mech: &Mechanism, states: &States, loads: &Loads, scale: 
 
 struct JointReactions<'a> {
     mech: &'a Mechanism,
-    joints: &'a [Joint],
+    joints: &'a [LinkJoint],
     states: &'a States<'a>,
     loads: &'a Loads<'a>,
     scale: f64,

@@ -5,7 +5,7 @@ use super::checks::{any_pose, finite, kept, reached, read_pose};
 use super::{FieldId, Table};
 use crate::kinematics::coordinate_sets::{self, Set};
 use crate::mobility::singularity;
-use crate::mobility::singularity_distance::{self, Search};
+use crate::mobility::singularity_distance::{self, SingularitySearch};
 use crate::model::mechanism::Mechanism;
 use crate::model::status::Status;
 use crate::number::lanes::Lanes;
@@ -133,7 +133,7 @@ pub fn searched_coordinates(mech: &Mechanism, set: &Set, names: Option<&[String]
 /// For each given coordinate its value at the nearest singular poses below and above, their kinds, and how far
 /// poses were looked at \[T34\].
 #[must_use]
-pub fn nearest_singular(mech: &Mechanism, poses: &[f64], search: &Search) -> Table {
+pub fn nearest_singular(mech: &Mechanism, poses: &[f64], search: &SingularitySearch) -> Table {
     let n = poses.len() / 16;
     let given: Vec<usize> = (0..search.set.names().len()).filter(|&i| search.given[i]).collect();
     let pair = || vec![given.len(), 2];

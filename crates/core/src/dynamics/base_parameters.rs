@@ -1,16 +1,17 @@
-//! The minimal set of inertial parameters: those combinations that active forces can tell apart \[T58\].
+//! Base inertial parameters: the minimal set of combinations that determine the active forces \[T58\].
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::dynamics::regressor::{Parameter, Regressor};
+use crate::dynamics::regressor::{InertialParameter, Regressor};
 use crate::kinematics::jacobian::{MotionSolver, PlatformMotion};
 use crate::kinematics::rows::RowNumbers;
 use crate::mobility::degrees_of_freedom;
 use crate::model::mechanism::Mechanism;
-use crate::numerics::random::Draw;
+use crate::numerics::random::Random;
 use crate::spatial::{Acceleration, Mat3, Motion, Pose, Twist};
 
-/// What is left of a column after all before it, relative to itself, where it counts as dependent on them.
+/// Relative remainder of a column after orthogonalisation against all before it, below which it counts as
+/// dependent.
 pub const DEPENDENT: f64 = 1e-8;
 
 /// A coefficient below this, in pure numbers, is the rounding of zero.
@@ -19,7 +20,7 @@ const ZERO: f64 = 1e-9;
 /// Equations for each parameter.
 const SURPLUS: usize = 3;
 
-/// How far from home poses are drawn: of the characteristic length and of a radian.
+/// Spread about home of the random poses: in characteristic lengths and radians.
 const SPREAD: f64 = 0.5;
 
 /// Pivot ratio of the Jacobian below which a drawn pose is passed over: forces there are large and say little.
@@ -35,11 +36,12 @@ pub struct BaseParameters {
     pub columns: Vec<usize>,
     /// One row for each of them, one column for each parameter.
     pub combination: DMatrix<f64>,
-    /// What was left of each column, relative to itself, after those kept before it: shows how clear the rank is.
+    /// Relative remainder of each column after orthogonalisation against those kept before it: shows how
+    /// clear the rank is.
     pub remainders: Vec<f64>,
 }
 
-/// The base parameters from the regressors of random states; none if too few states could be drawn.
+/// Base parameters from the regressors of random states; none if too few states could be drawn.
 #[must_use]
 pub fn base_parameters(mech: &Mechanism) -> Option<BaseParameters> {
     let regressor = Regressor::new(mech);
@@ -58,7 +60,7 @@ pub fn base_parameters(mech: &Mechanism) -> Option<BaseParameters> {
 }
 
 /// The parameter's unit, so that a column is that of a pure number: m = 1 kg, m c = Λ kg, I = Λ² kg.
-fn unit(p: &Parameter, scale: f64) -> f64 {
+fn unit(p: &InertialParameter, scale: f64) -> f64 {
     match p.numbers[0] {
         0 => 1.0,
         1..=3 => scale,
@@ -70,7 +72,7 @@ fn unit(p: &Parameter, scale: f64) -> f64 {
 fn stacked(mech: &Mechanism, regressor: &Regressor, units: &[f64]) -> Option<DMatrix<f64>> {
     let (legs, width) = (mech.actuated().count(), units.len());
     let states = (SURPLUS * width).div_ceil(legs);
-    let mut draw = Draw(0x9E37_79B9_7F4A_7C15);
+    let mut draw = Random(0x9E37_79B9_7F4A_7C15);
     let mut rows = DMatrix::zeros(states * legs, width);
     let mut found = 0;
     for _ in 0..TRIES * states {
@@ -91,13 +93,13 @@ fn stacked(mech: &Mechanism, regressor: &Regressor, units: &[f64]) -> Option<DMa
 
 /// A pose about home that keeps the constraints, moving as random leg rates and accelerations say; these are
 /// scaled so that weight and inertia are alike.
-fn random_state(mech: &Mechanism, draw: &mut Draw) -> Option<Motion<f64>> {
+fn random_state(mech: &Mechanism, draw: &mut Random) -> Option<Motion<f64>> {
     let size = mech.characteristic_length;
     let gravity = mech.gravity.norm();
     let gravity = if gravity > 0.0 { gravity } else { 1.0 };
     let start = Pose {
-        rotation: Mat3::from_rotation_vector(draw.vector(Draw::number) * SPREAD) * mech.home.rotation,
-        o: mech.home.o + draw.vector(Draw::number) * (SPREAD * size),
+        rotation: Mat3::from_rotation_vector(draw.vector(Random::number) * SPREAD) * mech.home.rotation,
+        o: mech.home.o + draw.vector(Random::number) * (SPREAD * size),
     };
     let driven = RowNumbers::of(mech).idle().end;
     let rates: Vec<f64> = (0..driven).map(|_| draw.number() * (gravity * size).sqrt()).collect();

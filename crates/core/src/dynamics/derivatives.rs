@@ -1,28 +1,28 @@
-//! Derivatives of inverse dynamics by the motion and by the geometry: the same equations with dual numbers, one
-//! direction at a time \[T56\].
+//! Derivatives of inverse dynamics by the motion and by the geometry, by dual numbers, one direction at a
+//! time \[T56\].
 //!
-//! Forces are the solution of a linear balance, so that what is differentiated is the balance with the forces kept:
-//! what it is off by, per unit of the direction, the forces must answer.
+//! Forces F solve the linear balance W + Jᵀ F = 0, which is differentiated implicitly: Jᵀ δF = -(δW + δJᵀ F),
+//! with W and J evaluated in dual numbers and F kept.
 
-use crate::assembly::geometric_parameters::{self, Parameter};
+use crate::assembly::geometric_parameters::{self, GeometricParameter};
 use crate::dynamics::force_balance::UnitForceResponse;
 use crate::dynamics::inverse_dynamics::{leg_wrench, load_in_base, own_wrench};
-use crate::kinematics::coordinate_sets::{self, Following, Set, Values, Variation, Varying};
+use crate::kinematics::coordinate_sets::{self, ImplicitSensitivity, Set, Values, Variation, Varying};
 use crate::kinematics::leg;
 use crate::kinematics::rows::{self, Row, RowNumbers};
 use crate::model::mechanism::{Leg, Mechanism};
 use crate::model::spec::Axes;
-use crate::number::lanes::Lanes;
+use crate::number::lanes::{Lanes, Work, work};
 use crate::number::real::{Constant, Dual, Jet, Real};
 use crate::spatial::{Acceleration, Motion, Pose, Twist, Vec3, Wrench};
 
-/// Numbers that a motion is varied in: six of the pose (o moves, and the platform turns about axes of the base through
-/// o), six of the twist, six of the acceleration.
+/// Numbers that a motion is varied in: six of the pose (o moves, and the platform rotates about axes of the
+/// base through o), six of the twist, six of the acceleration.
 pub const DIRECTIONS: usize = 18;
 
 /// Inverse dynamics at a state, solved. Forces and multipliers, or how they change, stand in the order of J's rows.
 #[derive(Clone, Copy)]
-pub(crate) struct Solved<'a, V: Real> {
+pub(crate) struct SolvedDynamics<'a, V: Real> {
     pub platform: Motion<V>,
     /// The load as it is given, with its axes.
     pub load: (Wrench<V>, Axes),
@@ -36,7 +36,7 @@ pub(crate) struct Solved<'a, V: Real> {
 /// What a variation takes the balance off by, forces and multipliers kept: the wrench on the platform, and where actuators are
 /// redundant what each row of J then does to y \[T74\].
 struct Imbalance<'a, 'b, V: Real> {
-    at: &'a Solved<'a, V>,
+    at: &'a SolvedDynamics<'a, V>,
     wrench: Wrench<Dual<V>>,
     motion: Twist<Dual<V>>,
     rows: &'b mut [V],
@@ -45,7 +45,7 @@ struct Imbalance<'a, 'b, V: Real> {
 impl<'a, 'b, V: Lanes> Imbalance<'a, 'b, V> {
     /// `rows` is room for a number of each row where actuators are redundant, else empty.
     #[inline(always)]
-    fn new(at: &'a Solved<'a, V>, wrench: Wrench<Dual<V>>, rows: &'b mut [V]) -> Self {
+    fn new(at: &'a SolvedDynamics<'a, V>, wrench: Wrench<Dual<V>>, rows: &'b mut [V]) -> Self {
         rows.fill(V::zero());
         let motion = Twist::new(at.motion.v.with_rate(Vec3::zero()), at.motion.omega.with_rate(Vec3::zero()));
         Imbalance { at, wrench, motion, rows }
@@ -60,21 +60,18 @@ impl<'a, 'b, V: Lanes> Imbalance<'a, 'b, V> {
         varied: &Motion<Dual<V>>,
         row: &mut usize,
     ) {
-        let leg = &mech.legs[index];
-        let place = leg::place(leg, &varied.pose);
-        let mut sum = leg_wrench(mech, index, leg, &place, varied);
-        if leg.actuated {
-            let unit = leg::row(leg, &place.0);
-            sum = sum + unit * Dual::new(self.at.forces[*row], V::zero());
-            if let Some(off) = self.rows.get_mut(*row) {
-                *off = unit.power(&self.motion).d;
+        let force = if mech.legs[index].actuated { self.at.forces[*row] } else { V::zero() };
+        let (sum, off) = V::apart(VariedLeg { mech, index, varied, force, motion: &self.motion });
+        self.wrench = self.wrench + sum;
+        if mech.legs[index].actuated {
+            if let Some(at) = self.rows.get_mut(*row) {
+                *at = off;
             }
             *row += 1;
         }
-        self.wrench = self.wrench + sum;
     }
 
-    /// Adds what an idle freedom's or a constraint's row does, its multiplier kept.
+    /// Adds what a local degree of freedom's or a constraint's row does, its multiplier kept.
     #[inline(always)]
     fn add_row<S: Constant<Dual<V>>>(&mut self, row: Row<'_, S>, number: usize, pose: &Pose<Dual<V>>) {
         let unit = row.wrench(pose);
@@ -91,10 +88,41 @@ impl<'a, 'b, V: Lanes> Imbalance<'a, 'b, V> {
     }
 }
 
+/// A leg's own wrench with that of its active force, as they vary, and what its row then does to y.
+struct VariedLeg<'a, S, V: Real> {
+    mech: &'a Mechanism<S>,
+    index: usize,
+    varied: &'a Motion<Dual<V>>,
+    force: V,
+    motion: &'a Twist<Dual<V>>,
+}
+
+impl<S: Constant<Dual<V>>, V: Lanes> Work<V> for VariedLeg<'_, S, V> {
+    type Result = (Wrench<Dual<V>>, V);
+
+    #[inline(always)]
+    fn run(self) -> (Wrench<Dual<V>>, V) {
+        let VariedLeg { mech, index, varied, force, motion } = self;
+        let leg = &mech.legs[index];
+        let place = leg::place(leg, &varied.pose);
+        let own = leg_wrench(mech, index, leg, &place, varied);
+        if !leg.actuated {
+            return (own, V::zero());
+        }
+        let unit = leg::row(leg, &place.0);
+        (own + unit * Dual::new(force, V::zero()), unit.power(motion).d)
+    }
+}
+
 /// Derivatives of active forces and multipliers by the motion in each direction, the other numbers kept: one column for each
 /// direction. `off` is room for a number of each row where actuators are redundant, else empty.
 #[inline(always)]
-pub(crate) fn by_motion<V: Lanes>(mech: &Mechanism, at: &Solved<V>, off: &mut [V], columns: &mut [V]) {
+pub(crate) fn by_motion<V: Lanes>(
+    mech: &Mechanism,
+    at: &SolvedDynamics<V>,
+    off: &mut [V],
+    columns: &mut [V],
+) {
     let width = mech.rows();
     for direction in 0..DIRECTIONS {
         let mut step = [V::zero(); DIRECTIONS];
@@ -139,7 +167,7 @@ fn part<V: Lanes>(step: &[V; DIRECTIONS], k: usize) -> Vec3<V> {
 #[inline(always)]
 fn step_of<V: Lanes>(rates: &Pose<Jet<V>>, varied: &Variation<V>) -> [V; DIRECTIONS] {
     let [now, moved] = [parts_of(rates), varied.pose];
-    // ω = ½ Σ x × x' over the columns of R, ε = ½ Σ x × x'' [T19]; a turn δθ makes δx = δθ × x.
+    // ω = ½ Σ x × x' over the columns of R, ε = ½ Σ x × x'' [T19]; a rotation δθ makes δx = δθ × x.
     let (mut turn, mut omega, mut eps) = (Vec3::zero(), Vec3::zero(), Vec3::zero());
     for k in 0..3 {
         turn = turn + now[0][k].cross(moved[0][k]);
@@ -194,13 +222,13 @@ fn along_step<V: Lanes>(by_motion: &[V], width: usize, row: usize, step: &[V; DI
 
 /// The coordinates at a state, and how the motion follows them.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Coordinates<V: Real> {
+pub(crate) struct VariedCoordinates<V: Real> {
     q: Values<Jet<V>>,
     pose: Pose<Jet<V>>,
-    pub following: Following<V>,
+    pub following: ImplicitSensitivity<V>,
 }
 
-impl<V: Lanes> Coordinates<V> {
+impl<V: Lanes> VariedCoordinates<V> {
     #[inline(always)]
     pub(crate) fn at(
         mech: &Mechanism,
@@ -209,11 +237,10 @@ impl<V: Lanes> Coordinates<V> {
         given: &[bool],
         platform: &Motion<V>,
     ) -> Self {
-        let q = coordinate_sets::along(mech, set, platform);
-        Coordinates { q, pose: platform.jets(), following: Following::at(&still.mech, &still.set, &q, given) }
+        V::apart(CoordinatesAt { mech, set, still, given, platform })
     }
 
-    /// What varies with a number of the set.
+    /// Variation of pose, rates and constraints with a number of the coordinate set.
     #[inline(always)]
     pub(crate) fn varied(&self, still: &Varied, number: usize) -> Variation<V> {
         V::apart(Varying { mech: &still.mech, set: &still.set, q: &self.q, number: Some(number) })
@@ -235,13 +262,13 @@ impl<V: Lanes> Coordinates<V> {
         }
     }
 
-    /// How the motion varies then.
+    /// Variation of the motion, with the dependent coordinates.
     #[inline(always)]
     pub(crate) fn step(&self, varied: &Variation<V>, order: usize) -> [V; DIRECTIONS] {
         step_of(&self.pose, &self.following.with(varied.by_rate(order)))
     }
 
-    /// How the motion follows a number of the geometry.
+    /// Variation of the motion with a number of the geometry, coordinates kept.
     #[inline(always)]
     pub(crate) fn following_geometry(&self, by: &Varied) -> [V; DIRECTIONS] {
         if !by.moves {
@@ -249,6 +276,19 @@ impl<V: Lanes> Coordinates<V> {
         }
         let variation = V::apart(Varying { mech: &by.mech, set: &by.set, q: &self.q, number: None });
         step_of(&self.pose, &self.following.with(variation))
+    }
+}
+
+work! {
+    CoordinatesAt<'a, V> {
+        mech: &'a Mechanism,
+        set: &'a Set,
+        still: &'a Varied,
+        given: &'a [bool],
+        platform: &'a Motion<V>,
+    } -> VariedCoordinates<V> {
+        let q = coordinate_sets::along(mech, set, platform);
+        VariedCoordinates { q, pose: platform.jets(), following: ImplicitSensitivity::at(&still.mech, &still.set, &q, given) }
     }
 }
 
@@ -278,7 +318,7 @@ impl Varied {
     }
 
     /// None if the set is none of the mechanism while it varies.
-    pub(crate) fn new(mech: &Mechanism, by: &Parameter, set: &Set) -> Option<Self> {
+    pub(crate) fn new(mech: &Mechanism, by: &GeometricParameter, set: &Set) -> Option<Self> {
         let mech = geometric_parameters::varied(mech, Some(by));
         let varies = |a: Vec3<Dual<f64>>| a.array().iter().any(|x| x.d != 0.0);
         let leg_varies = |leg: &Leg<Dual<f64>>| {
@@ -302,8 +342,8 @@ impl Varied {
 #[inline(always)]
 pub(crate) fn by_geometry<V: Lanes>(
     varied: &Varied,
-    at: &Solved<V>,
-    coordinates: &Coordinates<V>,
+    at: &SolvedDynamics<V>,
+    coordinates: &VariedCoordinates<V>,
     by_motion: &[V],
     off: &mut [V],
     column: &mut [V],

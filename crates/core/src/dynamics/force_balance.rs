@@ -4,16 +4,17 @@
 use crate::dynamics::inverse_dynamics::{Balance, transposed};
 use crate::kinematics::jacobian::scaled_jacobian;
 use crate::kinematics::redundant_rows::RedundantRows;
-use crate::kinematics::rows::RowNumbers;
+use crate::kinematics::rows::{Matrix6, RowNumbers};
 use crate::model::mechanism::Mechanism;
-use crate::number::lanes::Lanes;
-use crate::numerics::gauss::solve_all;
+use crate::number::lanes::{Lanes, work};
+use crate::numerics::gauss::{Solved, solve_all};
 use crate::spatial::{Motion, Pose, Twist, Wrench};
 
 /// Room for the balance of one state after another.
 pub struct ForceSolver<V> {
     pub numbers: RowNumbers,
-    /// For each row of J: active forces, torques of idle freedoms, multipliers of the independent constraints.
+    /// For each row of J: active forces, torques of local degrees of freedom, multipliers of the independent
+    /// constraints.
     pub forces: Vec<V>,
     /// Active forces to be near to, where actuators are redundant; none for zeros.
     pub preferred: Vec<V>,
@@ -74,6 +75,18 @@ pub struct UnitForceResponse<V> {
     redundant: Option<RedundantRows<V>>,
 }
 
+work! {
+    /// The columns where J is square.
+    UnitForces<'a, V> { mech: &'a Mechanism, pose: &'a Pose<V> } -> Solved<V, Matrix6<V>> {
+        let inverse = V::lit(1.0 / mech.characteristic_length);
+        let mut rhs = [[V::zero(); 6]; 6];
+        for k in 0..6 {
+            rhs[k][k] = if k < 3 { -V::one() } else { -inverse };
+        }
+        solve_all(transposed(&scaled_jacobian(mech, pose)), rhs)
+    }
+}
+
 impl<V: Lanes> UnitForceResponse<V> {
     /// Room for one pose after another.
     #[must_use]
@@ -92,12 +105,7 @@ impl<V: Lanes> UnitForceResponse<V> {
     pub fn set(&mut self, mech: &Mechanism, pose: &Pose<V>) {
         let columns = self.columns.chunks_exact_mut(self.rows);
         let Some(rows) = &mut self.redundant else {
-            let inverse = V::lit(1.0 / mech.characteristic_length);
-            let mut rhs = [[V::zero(); 6]; 6];
-            for k in 0..6 {
-                rhs[k][k] = if k < 3 { -V::one() } else { -inverse };
-            }
-            let solved = solve_all(transposed(&scaled_jacobian(mech, pose)), rhs);
+            let solved = V::apart(UnitForces { mech, pose });
             for (column, x) in columns.zip(&solved.x) {
                 column.copy_from_slice(x);
             }

@@ -1,4 +1,5 @@
-//! Forward dynamics: the acceleration that forces give, and the terms of the equation of motion \[T49\]-\[T52\].
+//! Forward dynamics: the acceleration for given forces, and the terms of the equations of motion
+//! \[T49\]-\[T52\].
 //!
 //! There are no equations of links here: the resultant of [`dynamics`](crate::dynamics::inverse_dynamics) is affine in the
 //! acceleration and, damping aside, quadratic in the twist, so that every term is a difference of resultants.
@@ -20,10 +21,10 @@ const UNKNOWNS: usize = 6 + MAX_CONSTRAINTS;
 /// An acceleration as large as those that weight gives, m/s².
 const STANDARD_GRAVITY: f64 = 10.0;
 
-/// How well rates of coordinates must give the twist back, relative to it.
+/// Largest relative residual of the rates of coordinates fitted to the twist.
 const FOLD_TOLERANCE: f64 = 1e-6;
 
-/// What forces do to the platform.
+/// Result of forward dynamics: the platform's acceleration and the multipliers for given forces.
 #[derive(Clone, Copy, Debug)]
 pub struct Driven<T: Real> {
     pub acceleration: Acceleration<T>,
@@ -52,7 +53,7 @@ pub fn forward_dynamics<T: Real>(
             count += 1;
         }
     }
-    // All in pure numbers: turns as arcs at Λ, masses by their mean, so that pivots compare.
+    // All in pure numbers: rotations as arcs at Λ, masses by their mean, so that pivots compare.
     let arcs: [f64; 6] = std::array::from_fn(|i| if i < 3 { 1.0 } else { 1.0 / scale });
     let mass = mass_matrix(mech, pose);
     let mut trace = T::zero();
@@ -216,7 +217,7 @@ pub fn coordinate_equations(
     Ok((equations(mech, free.len(), &rates, motion), rates))
 }
 
-/// The rates whose twist it is, `S q' = V` in the sense of least squares, turns counted as arcs.
+/// The rates whose twist it is, `S q' = V` in the sense of least squares, rotations counted as arcs.
 fn rates_of(mech: &Mechanism, columns: &[Twist<f64>; 6], count: usize, twist: &Twist<f64>) -> [f64; 6] {
     let dot = |a: &Twist<f64>, b: &Twist<f64>| {
         a.v.dot(b.v) + a.omega.dot(b.omega) * mech.characteristic_length * mech.characteristic_length
@@ -275,7 +276,7 @@ fn equations<T: Real>(
     }
 }
 
-/// Size of a twist squared, turns counted as arcs.
+/// Size of a twist squared, rotations counted as arcs.
 #[inline(always)]
 pub(crate) fn square<T: Real>(mech: &Mechanism, twist: &Twist<T>) -> T {
     let scale = mech.characteristic_length;

@@ -10,7 +10,7 @@ use crate::number::real::{Constant, Real};
 use crate::numerics::gauss::solve;
 use crate::spatial::{Acceleration, Mat3, Motion, Pose, Twist, Vec3, Wrench};
 
-/// The load on the platform at o; in platform axes it turns with the platform.
+/// The load on the platform at o; in platform axes it rotates with the platform.
 #[inline(always)]
 pub fn load_in_base<T: Real>(wrench: Wrench<T>, axes: Axes, pose: &Pose<T>) -> Wrench<T> {
     match axes {
@@ -33,7 +33,7 @@ pub(crate) fn turning_torque<T: Real>(inertia: Mat3<f64>, omega: Vec3<T>, eps: V
     -(inertia * eps + omega.cross(inertia * omega))
 }
 
-/// The same of a link with the given axes, all in base axes.
+/// Inertial torque -E [I Eᵀε + (Eᵀω)×(I Eᵀω)] of a link with axes E, in base axes \[T13\].
 #[inline(always)]
 fn inertial_torque<T: Real>(body: &Body, axes: Mat3<T>, omega: Vec3<T>, eps: Vec3<T>) -> Vec3<T> {
     axes * turning_torque(body.inertia, axes.transpose_mul(omega), axes.transpose_mul(eps))
@@ -72,7 +72,7 @@ pub(crate) fn leg_wrench<T: Real>(
     mech: &Mechanism<impl Constant<T>>,
     index: usize,
     leg: &Leg<impl Constant<T>>,
-    place: &leg::Place<T>,
+    place: &leg::LegPlacement<T>,
     platform: &Motion<T>,
 ) -> Wrench<T> {
     let state = leg::moving(leg, place, platform);
@@ -91,7 +91,7 @@ pub(crate) fn links_wrench<T: Real>(
     mech: &Mechanism<impl Constant<T>>,
     leg: &Leg<impl Constant<T>>,
     [cylinder, piston]: [&Body; 2],
-    state: &leg::State<T>,
+    state: &leg::LegState<T>,
 ) -> Wrench<T> {
     let axes = state.frame.axes;
     let at_base = axes.transpose_mul(Vec3::lift(mech.gravity));
@@ -104,7 +104,7 @@ pub(crate) fn links_wrench<T: Real>(
         leg::carry(leg, state, force, torque + about_b) + leg::row(leg, &state.position) * push
     } else {
         let (_, about_base) = turning_force(cylinder, &state.turn, at_base);
-        // Both turn as one.
+        // Both rotate as one.
         let inertia = piston.inertia + cylinder.inertia;
         let torque = turning_torque(inertia, state.turn.omega, state.turn.eps);
         leg::carry(leg, state, force, torque + about_b + about_base)
@@ -114,7 +114,7 @@ pub(crate) fn links_wrench<T: Real>(
 /// Weight and inertial force of a link of a leg \[T8\] \[T13\], and its torque about the link's reference point;
 /// `push` is gravity less the acceleration of that point.
 #[inline(always)]
-fn turning_force<T: Real>(body: &Body, turn: &leg::Turn<T>, push: Vec3<T>) -> (Vec3<T>, Vec3<T>) {
+fn turning_force<T: Real>(body: &Body, turn: &leg::LegRotation<T>, push: Vec3<T>) -> (Vec3<T>, Vec3<T>) {
     let center = Vec3::lift(body.center);
     let force =
         inertial_force(body, push, turn.eps.cross(center) + turn.omega.cross(turn.omega.cross(center)));
@@ -127,22 +127,24 @@ pub(crate) fn carried_rod<T: Real>(
     mech: &Mechanism<impl Constant<T>>,
     rod: &Rod<impl Constant<T>>,
     body: &Body,
-    leader: &leg::State<T>,
+    leader: &leg::LegState<T>,
 ) -> Wrench<T> {
     // Torque of its weight and inertia about its line [Eq. 36, 42].
     let about = Vec3::lift(rod.axis).dot(rod_wrench(mech, rod, body, leader).torque);
-    // The rod's power is its torque about L times ω_L = n·δ'/|L×δ|, with δ' = (v_b - ℓ'δ)/ℓ and n square to δ.
+    // The rod's power is its torque about L times ω_L = n·δ'/|L×δ|, with δ' = (v_b - ℓ'δ)/ℓ and n
+    // perpendicular to δ.
     let (p, f) = (&leader.position, &leader.frame);
     Wrench::at(p.e, f.n() * (about / (f.sine * p.length)))
 }
 
-/// The rod's weight and inertia as a wrench at its point, from its turn and its axes (L, n, L×n) [Eq. 36, 42].
+/// The rod's weight and inertia as a wrench at its point, from its rotation and its axes (L, n, L×n)
+/// [Eq. 36, 42].
 #[inline(always)]
 pub(crate) fn rod_wrench<T: Real>(
     mech: &Mechanism<impl Constant<T>>,
     rod: &Rod<impl Constant<T>>,
     body: &Body,
-    leader: &leg::State<T>,
+    leader: &leg::LegState<T>,
 ) -> Wrench<T> {
     let (axis, n) = (Vec3::lift(rod.axis), leader.frame.n());
     let turn = leg::rod_turn(axis, leader);
@@ -179,8 +181,8 @@ pub fn resultant<T: Real>(
     sum
 }
 
-/// Active forces along the actuated legs, then the torques of idle freedoms and the multipliers of the independent constraints:
-/// `F_r = -J⁻ᵀ {...}` [Eq. 43], with the pivot ratio of J.
+/// Active forces along the actuated legs, then the torques of local degrees of freedom and the multipliers of
+/// the independent constraints: `F_r = -J⁻ᵀ {...}` [Eq. 43], with the pivot ratio of J.
 #[inline(always)]
 pub fn inverse_dynamics<T: Real>(
     mech: &Mechanism<impl Constant<T>>,
@@ -221,7 +223,7 @@ impl<T: Real> Balance<T> {
         mech: &Mechanism<S>,
         index: usize,
         leg: &Leg<S>,
-        place: &leg::Place<T>,
+        place: &leg::LegPlacement<T>,
         platform: &Motion<T>,
     ) {
         self.wrench = self.wrench + leg_wrench(mech, index, leg, place, platform);
@@ -320,10 +322,10 @@ pub struct Coupled<T> {
 
 /// The couple-constrained forces of two legs on one rod from the constraint's multiplier f_c \[T16\].
 ///
-/// The consistent balance: the rod is free to turn about L, so the moments of both forces about L cancel, and
-/// together they are the wrench f_c (c, τ): `f_c1 = f_c d_3/l`, `f_c3 = -f_c d_1/l`, `T_c = f_c1 d_1`.
-/// As printed [Eq. 44]: `f_c1 = f_c/(1 + k)`, `f_c3 = f_c - f_c1`, `k = d_1/d_3`, which takes c_3 for c_1 where the
-/// paper has c_3 = -c_1.
+/// The consistent balance: the rod is free to rotate about L, so the moments of both forces about L cancel,
+/// and together they are the wrench f_c (c, τ): `f_c1 = f_c d_3/l`, `f_c3 = -f_c d_1/l`, `T_c = f_c1 d_1`. As
+/// printed [Eq. 44]: `f_c1 = f_c/(1 + k)`, `f_c3 = f_c - f_c1`, `k = d_1/d_3`, which takes c_3 for c_1 where
+/// the paper has c_3 = -c_1.
 #[inline(always)]
 pub fn coupled_forces<T: Real>(
     mech: &Mechanism<impl Constant<T>>,

@@ -1,4 +1,5 @@
-//! Reactions of all joints: what each makes the link on its base side do to the link on its platform side \[T44\]-\[T48\].
+//! Reactions of all joints: the wrench of the link on the base's side on the link on the platform's side
+//! \[T44\]-\[T48\].
 //!
 //! The wrenches of the legs on the platform are the unknowns; every other reaction follows from them link by link,
 //! from the platform down. What they must satisfy is that no joint carries what it leaves free, and that the platform is
@@ -13,23 +14,23 @@ use crate::spatial::{Mat3, Motion, Pose, Vec3, Wrench};
 
 /// A joint between two links.
 #[derive(Clone, Debug)]
-pub struct Joint {
+pub struct LinkJoint {
     /// R, S, U, P, or F where two links are one.
     pub kind: &'static str,
     pub name: String,
     /// The link on the base's side, and that on the platform's.
     pub links: [String; 2],
-    /// What it leaves free: components, in joint axes, force before torque, of a reaction that it cannot carry.
+    /// Components of the reaction that the joint cannot transmit, in joint axes, force before torque.
     pub(crate) free: Vec<usize>,
 }
 
 /// All joints: the rods' bearings, then for each leg base joint, prismatic joint and platform joint. A slider's prismatic
 /// joint lies below its base joint, between base and carriage.
 #[must_use]
-pub fn joints(mech: &Mechanism) -> Vec<Joint> {
+pub fn joints(mech: &Mechanism) -> Vec<LinkJoint> {
     let mut all = Vec::new();
     let mut add = |kind: &'static str, name: String, links: [String; 2], free: &[usize]| {
-        all.push(Joint { kind, name, links, free: free.to_vec() });
+        all.push(LinkJoint { kind, name, links, free: free.to_vec() });
     };
     let rod_name = |rod: usize| format!("rod {}", mech.rods[rod].name);
     for r in 0..mech.rods.len() {
@@ -57,14 +58,14 @@ pub fn joints(mech: &Mechanism) -> Vec<Joint> {
 
 /// A joint's point and its axes as columns, both in base axes \[T44\].
 #[derive(Clone, Copy, Debug)]
-pub struct Place<T> {
+pub struct JointFrame<T> {
     pub point: Vec3<T>,
     pub axes: Mat3<T>,
 }
 
-impl<T: Real> Place<T> {
+impl<T: Real> JointFrame<T> {
     pub(crate) fn nowhere() -> Self {
-        Place { point: Vec3::zero(), axes: Mat3::identity() }
+        JointFrame { point: Vec3::zero(), axes: Mat3::identity() }
     }
 
     /// A wrench in joint axes.
@@ -74,16 +75,16 @@ impl<T: Real> Place<T> {
     }
 }
 
-/// Where all joints are, in the order of [`joints`].
+/// Points and axes of all joints, in the order of [`joints`].
 #[must_use]
-pub fn places<T: Real>(mech: &Mechanism, pose: &Pose<T>) -> Vec<Place<T>> {
-    let mut all = vec![Place::nowhere(); mech.rods.len() + 3 * mech.legs.len()];
+pub fn places<T: Real>(mech: &Mechanism, pose: &Pose<T>) -> Vec<JointFrame<T>> {
+    let mut all = vec![JointFrame::nowhere(); mech.rods.len() + 3 * mech.legs.len()];
     put_places(mech, pose, &mut all);
     all
 }
 
 #[inline(always)]
-pub(crate) fn put_places<T: Real>(mech: &Mechanism, pose: &Pose<T>, all: &mut [Place<T>]) {
+pub(crate) fn put_places<T: Real>(mech: &Mechanism, pose: &Pose<T>, all: &mut [JointFrame<T>]) {
     let rods = mech.rods.len();
     for (i, leg) in mech.legs.iter().enumerate() {
         let (p, frame) = leg::place(leg, pose);
@@ -93,13 +94,19 @@ pub(crate) fn put_places<T: Real>(mech: &Mechanism, pose: &Pose<T>, all: &mut [P
     for (r, rod) in mech.rods.iter().enumerate() {
         // The prismatic joint of the leg that leads the rod has the leg's own axes, n first.
         let (axis, n) = (Vec3::lift(rod.axis), all[rods + 3 * rod.leader + 1].axes.0[0]);
-        all[r] = Place { point: Vec3::lift(rod.point), axes: Mat3::from_columns(axis, n, axis.cross(n)) };
+        all[r] =
+            JointFrame { point: Vec3::lift(rod.point), axes: Mat3::from_columns(axis, n, axis.cross(n)) };
     }
 }
 
 /// Base joint at B, prismatic joint at b, platform joint at b; of a slider the first two at the strut's foot.
 #[inline(always)]
-fn leg_places<T: Real>(leg: &Leg, pose: &Pose<T>, p: &leg::Position<T>, axes: &Mat3<T>) -> [Place<T>; 3] {
+fn leg_places<T: Real>(
+    leg: &Leg,
+    pose: &Pose<T>,
+    p: &leg::Position<T>,
+    axes: &Mat3<T>,
+) -> [JointFrame<T>; 3] {
     let below = match (leg.rod, leg.base.normal()) {
         (None, Some(Normal::Across(u))) => universal(Vec3::lift(u), axes.0[0]),
         _ => *axes,
@@ -110,8 +117,8 @@ fn leg_places<T: Real>(leg: &Leg, pose: &Pose<T>, p: &leg::Position<T>, axes: &M
     };
     let (base, end) = (leg::foot(leg, p), pose.o + p.e);
     let (point, along) = leg.drive.joint([Vec3::lift(leg.base.point), base, end], axes);
-    let slide = Place { point, axes: along };
-    [Place { point: base, axes: below }, slide, Place { point: end, axes: above }]
+    let slide = JointFrame { point, axes: along };
+    [JointFrame { point: base, axes: below }, slide, JointFrame { point: end, axes: above }]
 }
 
 /// (u, n, u×n) for the two axes of a universal joint; its couple is about the third.
@@ -173,7 +180,7 @@ fn link_wrench<T: Real>(
     body: &Body,
     gravity: Vec3<T>,
     center: &leg::PointMotion<T>,
-    (axes, turn): (Mat3<T>, leg::Turn<T>),
+    (axes, turn): (Mat3<T>, leg::LegRotation<T>),
 ) -> Wrench<T> {
     let torque = axes * turning_torque(body.inertia, turn.omega, turn.eps);
     let force = inertial_force(body, gravity, center.acceleration);
@@ -185,7 +192,7 @@ fn link_wrench<T: Real>(
 #[must_use]
 pub fn reactions<T: Real>(
     mech: &Mechanism,
-    places: &[Place<T>],
+    places: &[JointFrame<T>],
     given: &Given<T>,
     on_platform: &[Wrench<T>],
 ) -> Vec<Wrench<T>> {
@@ -197,7 +204,7 @@ pub fn reactions<T: Real>(
 #[inline(always)]
 pub(crate) fn put_reactions<T: Real>(
     mech: &Mechanism,
-    places: &[Place<T>],
+    places: &[JointFrame<T>],
     given: &Given<T>,
     on_platform: &[Wrench<T>],
     all: &mut [Wrench<T>],
@@ -222,13 +229,13 @@ pub(crate) fn put_reactions<T: Real>(
     }
 }
 
-/// What the reactions must make zero: components that joints do not carry, then the platform's balance at o; torques divided
-/// by the characteristic length \[T46\].
+/// Residual of the equilibrium equations: components that joints do not transmit, then the platform's balance
+/// at o; torques divided by the characteristic length \[T46\].
 #[must_use]
 pub fn unbalanced<T: Real>(
     mech: &Mechanism,
-    joints: &[Joint],
-    places: &[Place<T>],
+    joints: &[LinkJoint],
+    places: &[JointFrame<T>],
     o: Vec3<T>,
     given: &Given<T>,
     reactions: &[Wrench<T>],
@@ -241,8 +248,8 @@ pub fn unbalanced<T: Real>(
 #[inline(always)]
 pub(crate) fn put_unbalanced<T: Real>(
     mech: &Mechanism,
-    joints: &[Joint],
-    places: &[Place<T>],
+    joints: &[LinkJoint],
+    places: &[JointFrame<T>],
     o: Vec3<T>,
     given: &Given<T>,
     reactions: &[Wrench<T>],
@@ -276,12 +283,12 @@ pub(crate) fn pure<T: Real>(w: Wrench<T>, length: f64) -> Wrench<T> {
     Wrench::new(w.force, w.torque.scale(1.0 / length))
 }
 
-/// What the legs that constrain the platform do to it at o beyond their active forces \[T48\]. No self-stress changes
-/// the sum.
+/// Constraint wrench W_c = Σ[(F, T + e×F) - f (δ, e×δ)] of the constraining legs on the platform at o
+/// \[T48\]. No self-stress changes the sum.
 #[inline(always)]
 pub(crate) fn constraint_wrench<T: Real>(
     mech: &Mechanism,
-    places: &[Place<T>],
+    places: &[JointFrame<T>],
     pose: &Pose<T>,
     reactions: &[Wrench<T>],
 ) -> Wrench<T> {

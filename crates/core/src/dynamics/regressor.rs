@@ -44,18 +44,18 @@ const ENTRIES: [(usize, usize); 6] = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2
 /// Each number of a body by itself.
 const EACH: [&[usize]; NUMBERS] = [&[0], &[1], &[2], &[3], &[4], &[5], &[6], &[7], &[8], &[9]];
 
-/// What a body has that is symmetric about its leg, as it must be where the leg spins freely: I_xx and I_zz are one.
+/// Parameters of a body symmetric about its leg, as it must be where the leg spins freely: I_xx = I_zz.
 const SYMMETRIC: [&[usize]; 4] = [&[0], &[2], &[4, 9], &[7]];
 
 /// One inertial parameter of a link.
 #[derive(Clone, Copy, Debug)]
-pub struct Parameter {
+pub struct InertialParameter {
     pub link: Link,
     /// Which of the ten numbers it is; two for a radius of symmetry.
     pub numbers: &'static [usize],
 }
 
-impl Parameter {
+impl InertialParameter {
     /// Name of the standard parameter: `piston 1 mc_y`.
     #[must_use]
     pub fn standard_name(&self, mech: &Mechanism) -> String {
@@ -86,7 +86,7 @@ fn spins_freely(leg: &Leg) -> bool {
 
 /// The parameters of all links in order: platform, cylinder and piston of each leg, rods.
 #[must_use]
-pub fn parameters(mech: &Mechanism) -> Vec<Parameter> {
+pub fn parameters(mech: &Mechanism) -> Vec<InertialParameter> {
     let legs = mech.legs.iter().enumerate().flat_map(|(i, leg)| {
         let numbers: &[&[usize]] = if spins_freely(leg) { &SYMMETRIC } else { &EACH };
         let first = leg.drive.kind().own_numbers.unwrap_or(numbers);
@@ -96,7 +96,7 @@ pub fn parameters(mech: &Mechanism) -> Vec<Parameter> {
     std::iter::once((Link::Platform, &EACH[..]))
         .chain(legs)
         .chain(rods)
-        .flat_map(|(link, numbers)| numbers.iter().map(move |numbers| Parameter { link, numbers }))
+        .flat_map(|(link, numbers)| numbers.iter().map(move |numbers| InertialParameter { link, numbers }))
         .collect()
 }
 
@@ -147,7 +147,7 @@ fn unit_body(number: usize) -> Body {
 /// The current values of the standard parameters.
 #[must_use]
 pub fn standard_values(mech: &Mechanism) -> Vec<f64> {
-    let value = |p: &Parameter| standard(central(body(mech, p.link)))[p.numbers[0]];
+    let value = |p: &InertialParameter| standard(central(body(mech, p.link)))[p.numbers[0]];
     parameters(mech).iter().map(value).collect()
 }
 
@@ -162,7 +162,7 @@ fn body(mech: &Mechanism, link: Link) -> &Body {
 
 /// Forces of unit parameters.
 pub struct Regressor {
-    pub parameters: Vec<Parameter>,
+    pub parameters: Vec<InertialParameter>,
     /// The bodies whose wrenches, with these signs, are that of each parameter's unit.
     units: Vec<Vec<(f64, Body)>>,
     /// From columns of Y to the derivatives by the file's numbers: columns and their factors, for each.
@@ -179,7 +179,7 @@ impl Regressor {
             [Some((1.0, unit_body(k))), first_moment.then(|| (-1.0, unit_body(0)))].into_iter().flatten()
         };
         let units: Vec<_> = parameters.iter().map(|p| p.numbers.iter().flat_map(unit).collect()).collect();
-        let derivative = |p: &Parameter| {
+        let derivative = |p: &InertialParameter| {
             let mut seeded = central(body(mech, p.link)).map(|x| Dual::new(x, 0.0));
             p.numbers.iter().for_each(|&k| seeded[k].d = 1.0);
             let rates = standard(seeded).map(|x| x.d);
@@ -191,7 +191,7 @@ impl Regressor {
         Regressor { parameters, units, by_bodies }
     }
 
-    /// For each parameter the active forces and multipliers that its unit asks for: the columns of Y \[T57\].
+    /// For each parameter the active forces and multipliers for a unit of it: the columns of Y \[T57\].
     pub fn columns(&self, mech: &Mechanism, platform: &Motion<f64>) -> Vec<Vec<f64>> {
         let legs: Vec<_> = mech.legs.iter().map(|leg| leg::state(leg, platform)).collect();
         let mut response = UnitForceResponse::new(mech);
@@ -204,13 +204,13 @@ impl Regressor {
         (0..self.parameters.len()).map(column).collect()
     }
 
-    /// What a unit of the k-th parameter puts on the platform.
+    /// Wrench on the platform of a unit of the k-th parameter.
     #[inline(always)]
     pub(crate) fn wrench<T: Real>(
         &self,
         mech: &Mechanism,
         platform: &Motion<T>,
-        legs: &[leg::State<T>],
+        legs: &[leg::LegState<T>],
         k: usize,
     ) -> Wrench<T> {
         let mut sum = Wrench::zero();
@@ -234,7 +234,7 @@ impl Regressor {
         sum
     }
 
-    /// What load and damping put on the platform.
+    /// Wrench of load and damping on the platform, divided by the efficiency.
     #[inline(always)]
     pub(crate) fn rest<T: Real>(mech: &Mechanism, twist: &Twist<T>, load: Wrench<T>) -> Wrench<T> {
         (load + inverse_dynamics::damping_wrench(mech, twist)) * T::lit(1.0 / mech.efficiency)

@@ -1,15 +1,16 @@
-//! Reactions where several will do: all that balance the links, the self-stresses that they differ by, and the two choices
-//! among them \[T46\] \[T47\]. For one state or for one in each lane, in room that is made once.
+//! Statically indeterminate reactions: a particular solution of the equilibrium of all links, the
+//! self-stresses (null space), and the two choices among the solutions \[T46\] \[T47\]. For one state or for
+//! one in each lane, in memory allocated once.
 
 use crate::dynamics::force_balance::ForceSolver;
 use crate::dynamics::joint_reactions::{
-    Given, Joint, Place, constraint_wrench, pure, put_places, put_reactions, put_unbalanced,
+    Given, JointFrame, LinkJoint, constraint_wrench, pure, put_places, put_reactions, put_unbalanced,
 };
 use crate::kinematics::idle;
 use crate::model::drive::Drive;
 use crate::model::joint::JointKind;
 use crate::model::mechanism::Mechanism;
-use crate::number::lanes::{Lanes, any};
+use crate::number::lanes::{Lanes, any, work};
 use crate::number::real::{Mask, Real};
 use crate::numerics::householder::Householder;
 use crate::spatial::{Motion, Pose, Vec3, Wrench};
@@ -17,7 +18,7 @@ use crate::spatial::{Motion, Pose, Vec3, Wrench};
 /// Least to greatest singular value of the platform's and the rods' balances below which the pose is singular.
 const SINGULAR: f64 = 1e-12;
 
-/// What may be left of the balances, relative to the reactions.
+/// Largest residual of the equilibrium equations, relative to the reactions.
 const RESIDUAL: f64 = 1e-9;
 
 /// A component (torques divided by Λ) that no self-stress of size one changes by more is determinate: poses may miss their
@@ -28,13 +29,13 @@ const OPEN: f64 = 1e-6;
 /// is rounding.
 const SQUARE: f64 = 1e-15;
 
-/// Far more turns of all pairs than any self-stresses need.
+/// Far more rotations of all pairs than any self-stresses need.
 const SWEEPS: usize = 60;
 
 /// Reactions of all joints in the order of [`joints`](crate::dynamics::joint_reactions::joints), each at its joint's point in base axes.
 #[derive(Clone, Debug)]
 pub struct Reactions {
-    pub places: Vec<Place<f64>>,
+    pub places: Vec<JointFrame<f64>>,
     /// Universal joints carry no couple, as far as balance lets them \[T47\].
     pub assumed: Vec<Wrench<f64>>,
     /// The least in sum of squares \[T47\].
@@ -51,7 +52,7 @@ pub struct Reactions {
 #[must_use]
 pub fn solve(
     mech: &Mechanism,
-    joints: &[Joint],
+    joints: &[LinkJoint],
     platform: &Motion<f64>,
     load: Wrench<f64>,
     scale: f64,
@@ -72,7 +73,7 @@ pub fn solve(
 /// Solves for the reactions at one state after the other.
 pub(crate) struct Solver<'a, V> {
     mech: &'a Mechanism,
-    joints: &'a [Joint],
+    joints: &'a [LinkJoint],
     legs: Vec<LegBalance<V>>,
     /// Wrenches on the platform that hold what nothing in the mechanism does: at o, torques divided by the characteristic
     /// length.
@@ -87,7 +88,7 @@ pub(crate) struct Solver<'a, V> {
     choice: Choice<V>,
     /// Where actuators are redundant.
     forces: Option<ForceSolver<V>>,
-    pub places: Vec<Place<V>>,
+    pub places: Vec<JointFrame<V>>,
     /// See [`Reactions`]; 1 for components that are determinate, else 0.
     pub assumed: Vec<Wrench<V>>,
     pub least: Vec<Wrench<V>>,
@@ -96,10 +97,11 @@ pub(crate) struct Solver<'a, V> {
     pub constraint: Wrench<V>,
 }
 
-/// What a leg can do to the platform, at its b in base axes, torques divided by the characteristic length: one wrench that
-/// balances what is given in the leg, and those that its joints carry without any.
+/// Wrenches of a leg on the platform, at its b in base axes, torques divided by the characteristic length:
+/// the particular one that balances the given forces of the leg, and a basis of those that its joints
+/// transmit without any.
 struct LegBalance<V> {
-    /// What its joints leave free: the joint, from base to platform, and the component.
+    /// Components that its joints cannot transmit: the joint, from base to platform, and the component.
     free: Vec<(usize, usize)>,
     system: Householder<V>,
     /// The first of its columns in the whole.
@@ -111,14 +113,14 @@ struct LegBalance<V> {
 }
 
 impl<V: Lanes> LegBalance<V> {
-    fn new(joints: &[Joint], first: usize, pushed: bool) -> Self {
+    fn new(joints: &[LinkJoint], first: usize, pushed: bool) -> Self {
         let mut free: Vec<_> = joints
             .iter()
             .enumerate()
             .flat_map(|(j, joint)| joint.free.iter().map(move |&k| (j, k)))
             .collect();
         if joints[0].kind == JointKind::Spherical.letter() && joints[2].kind == joints[0].kind {
-            // Turning about itself is free at either end, and is one motion: neither end can hold it.
+            // Rotation about itself is free at either end, and is one motion: neither end can hold it.
             free.retain(|&at| at != (0, 4));
         }
         if pushed {
@@ -137,7 +139,13 @@ impl<V: Lanes> LegBalance<V> {
 
     /// A joint carries nothing where it is free: no power along its motion there, seen at b \[T44\].
     #[inline(always)]
-    fn solve(&mut self, drive: Drive, places: &[Place<V>], [first, second]: [Wrench<V>; 2], length: f64) {
+    fn solve(
+        &mut self,
+        drive: Drive,
+        places: &[JointFrame<V>],
+        [first, second]: [Wrench<V>; 2],
+        length: f64,
+    ) {
         let end = places[2].point;
         // What is given above the joint, at its point.
         let at_base = second.moved(end - places[0].point);
@@ -186,7 +194,7 @@ impl<V: Lanes> LegBalance<V> {
 
 impl<'a, V: Lanes> Solver<'a, V> {
     /// Room for the states of a mechanism; `scale`, m, is what torques are divided by in the least sum of squares.
-    pub(crate) fn new(mech: &'a Mechanism, joints: &'a [Joint], scale: f64) -> Self {
+    pub(crate) fn new(mech: &'a Mechanism, joints: &'a [LinkJoint], scale: f64) -> Self {
         let (rods, mut count, mut legs) = (mech.rods.len(), 0, Vec::new());
         for i in 0..mech.legs.len() {
             let pushed = mech.is_redundant() && mech.legs[i].actuated;
@@ -194,7 +202,8 @@ impl<'a, V: Lanes> Solver<'a, V> {
             count += leg.carried.len();
             legs.push(leg);
         }
-        // Given forces of all actuators hold the platform in all its freedoms, the others in the idle ones.
+        // Given forces of all actuators hold the platform in all its degrees of freedom, the others in the
+        // idle ones.
         let props = if mech.is_redundant() { mech.dof() } else { mech.idle.len() };
         count += props;
         let (all, rows) = (joints.len(), 6 + rods);
@@ -213,7 +222,7 @@ impl<'a, V: Lanes> Solver<'a, V> {
             unbalanced: vec![V::zero(); free + 6],
             choice: Choice::new(joints, count.saturating_sub(rows), mech.characteristic_length, scale),
             forces: mech.is_redundant().then(|| ForceSolver::new(mech)),
-            places: vec![Place::nowhere(); all],
+            places: vec![JointFrame::nowhere(); all],
             assumed: vec![Wrench::zero(); all],
             least: vec![Wrench::zero(); all],
             determinate: vec![[V::zero(); 6]; all],
@@ -226,15 +235,15 @@ impl<'a, V: Lanes> Solver<'a, V> {
     #[inline(always)]
     pub(crate) fn solve(&mut self, platform: &Motion<V>, load: Wrench<V>) -> Mask<V> {
         let (mech, pose) = (self.mech, &platform.pose);
-        self.given.set(mech, platform, load);
+        V::apart(SetGiven { given: &mut self.given, mech, platform, load });
         let Some(forces) = &mut self.forces else {
             for k in 0..mech.idle.len() {
                 self.props[k] = Wrench::new(Vec3::zero(), idle::axis(&mech.idle[k], pose));
             }
             return self.solve_given(pose);
         };
-        // Redundant actuators push with their least forces \[T72\], which leave the platform's freedoms nothing to hold: what
-        // the props hold shows as an error.
+        // Redundant actuators push with their least forces \[T72\], which leave the platform's degrees of
+        // freedom nothing to hold: what the props hold shows as an error.
         let regular = forces.solve_motion(mech, platform, load);
         let mut row = 0;
         for (leg, balance) in mech.legs.iter().zip(&mut self.legs) {
@@ -259,34 +268,40 @@ impl<'a, V: Lanes> Solver<'a, V> {
     #[inline(always)]
     fn solve_given(&mut self, pose: &Pose<V>) -> Mask<V> {
         let mech = self.mech;
-        put_places(mech, pose, &mut self.places);
-        self.set_up(pose.o);
-        self.system.factor();
-        let regular = self.system.reciprocal_condition();
-        self.system.solve(&mut self.unknowns);
+        V::apart(SetPlaces { mech, pose, places: &mut self.places });
+        let regular = V::apart(SolveBalances { solver: self, o: pose.o });
         if !mech.is_redundant() {
             self.add_idle_torques();
         }
         self.put_on_platform(true);
-        put_reactions(mech, &self.places, &self.given, &self.on_platform, &mut self.least);
-        let holds = self.holds(pose.o, regular);
+        V::apart(PutReactions {
+            mech,
+            places: &self.places,
+            given: &self.given,
+            on_platform: &self.on_platform,
+            all: &mut self.least,
+        });
+        let holds = V::apart(Holds { solver: self, o: pose.o, regular });
 
         for k in 0..self.choice.count {
             self.system.null_vector(k, &mut self.unknowns);
             self.put_on_platform(false);
             let stress = &mut self.choice.stresses[k * self.places.len()..(k + 1) * self.places.len()];
-            put_reactions(mech, &self.places, &self.none, &self.on_platform, stress);
+            let (places, given, on_platform) = (&self.places, &self.none, &self.on_platform);
+            V::apart(PutReactions { mech, places, given, on_platform, all: stress });
         }
-        self.choice.turn(&self.places);
+        V::apart(TurnStresses { choice: &mut self.choice, places: &self.places });
         self.assumed.copy_from_slice(&self.least);
-        self.choice.make_least(&self.places, false, &mut self.least);
-        self.choice.make_least(&self.places, true, &mut self.assumed);
-        self.put_determinate();
+        let (choice, places) = (&mut self.choice, &self.places);
+        V::apart(MakeLeast { choice, places, couples_first: false, reactions: &mut self.least });
+        let (choice, places) = (&mut self.choice, &self.places);
+        V::apart(MakeLeast { choice, places, couples_first: true, reactions: &mut self.assumed });
+        V::apart(PutDeterminate { solver: self });
         self.constraint = constraint_wrench(mech, &self.places, pose, &self.assumed);
         holds
     }
 
-    /// What the props of idle freedoms do is given from now on.
+    /// Takes the torques of the fictitious supports of local degrees of freedom as given from now on.
     #[inline(always)]
     fn add_idle_torques(&mut self) {
         let (length, first) = (self.mech.characteristic_length, self.props_from());
@@ -296,7 +311,7 @@ impl<'a, V: Lanes> Solver<'a, V> {
         }
     }
 
-    /// The column of the first prop.
+    /// The column of the first fictitious support.
     #[inline(always)]
     fn props_from(&self) -> usize {
         self.legs.last().map_or(0, |leg| leg.first + leg.carried.len())
@@ -332,7 +347,8 @@ impl<'a, V: Lanes> Solver<'a, V> {
             let below = rods + 3 * i;
             let [cylinder, piston] = self.given.legs[i];
             let leg = &mut self.legs[i];
-            leg.solve(mech.legs[i].drive, &self.places[below..below + 3], self.given.legs[i], length);
+            let (drive, places) = (mech.legs[i].drive, &self.places[below..below + 3]);
+            V::apart(SolveLeg { leg: &mut *leg, drive, places, given: self.given.legs[i], length });
             let (base, end) = (self.places[below].point, self.places[below + 2].point);
             let e = (end - o).scale(pure_lever);
             let particular = leg.particular.moved(e).array();
@@ -416,6 +432,75 @@ impl<'a, V: Lanes> Solver<'a, V> {
     }
 }
 
+// Parts of the solution, each a function of its own.
+work! {
+    SetGiven<'a, V> { given: &'a mut Given<V>, mech: &'a Mechanism, platform: &'a Motion<V>, load: Wrench<V> } -> () {
+        given.set(mech, platform, load);
+    }
+}
+work! {
+    SetPlaces<'a, V> { mech: &'a Mechanism, pose: &'a Pose<V>, places: &'a mut [JointFrame<V>] } -> () {
+        put_places(mech, pose, places);
+    }
+}
+work! {
+    SolveLeg<'a, V> {
+        leg: &'a mut LegBalance<V>,
+        drive: Drive,
+        places: &'a [JointFrame<V>],
+        given: [Wrench<V>; 2],
+        length: f64,
+    } -> () {
+        leg.solve(drive, places, given, length);
+    }
+}
+work! {
+    /// Puts the shares, and tells how regular the balances are.
+    SolveBalances<'a, 'b, V> { solver: &'a mut Solver<'b, V>, o: Vec3<V> } -> V {
+        solver.set_up(o);
+        solver.system.factor();
+        let regular = solver.system.reciprocal_condition();
+        solver.system.solve(&mut solver.unknowns);
+        regular
+    }
+}
+work! {
+    PutReactions<'a, V> {
+        mech: &'a Mechanism,
+        places: &'a [JointFrame<V>],
+        given: &'a Given<V>,
+        on_platform: &'a [Wrench<V>],
+        all: &'a mut [Wrench<V>],
+    } -> () {
+        put_reactions(mech, places, given, on_platform, all);
+    }
+}
+work! {
+    Holds<'a, 'b, V> { solver: &'a mut Solver<'b, V>, o: Vec3<V>, regular: V } -> Mask<V> {
+        solver.holds(o, regular)
+    }
+}
+work! {
+    TurnStresses<'a, V> { choice: &'a mut Choice<V>, places: &'a [JointFrame<V>] } -> () {
+        choice.turn(places);
+    }
+}
+work! {
+    MakeLeast<'a, V> {
+        choice: &'a mut Choice<V>,
+        places: &'a [JointFrame<V>],
+        couples_first: bool,
+        reactions: &'a mut [Wrench<V>],
+    } -> () {
+        choice.make_least(places, couples_first, reactions);
+    }
+}
+work! {
+    PutDeterminate<'a, 'b, V> { solver: &'a mut Solver<'b, V> } -> () {
+        solver.put_determinate();
+    }
+}
+
 /// The sum and the squares of a wrench's components.
 #[inline(always)]
 fn add_square<V: Real>(w: Wrench<V>, mut sum: V) -> V {
@@ -432,7 +517,7 @@ struct Choice<V> {
     /// How many joints there are, and which of them are universal.
     joints: usize,
     universal: Vec<usize>,
-    /// What couples are divided by, and torques in the least sum of squares, m.
+    /// Length that divides couples, and torques in the sum of squares that is minimised, m.
     length: f64,
     scale: f64,
     /// The reactions of all joints, of one self-stress after the other.
@@ -446,7 +531,7 @@ struct Choice<V> {
 }
 
 impl<V: Lanes> Choice<V> {
-    fn new(joints: &[Joint], count: usize, length: f64, scale: f64) -> Self {
+    fn new(joints: &[LinkJoint], count: usize, length: f64, scale: f64) -> Self {
         let is_universal = |&j: &usize| joints[j].kind == JointKind::Universal.letter();
         let universal: Vec<usize> = (0..joints.len()).filter(is_universal).collect();
         Choice {
@@ -468,9 +553,10 @@ impl<V: Lanes> Choice<V> {
         &self.stresses[k * self.joints..(k + 1) * self.joints]
     }
 
-    /// Turns the self-stresses into others, orthonormal as they are, whose couples are square to one another.
+    /// Rotates the self-stresses into others, orthonormal as they are, whose couples are perpendicular to one
+    /// another.
     #[inline(always)]
-    fn turn(&mut self, places: &[Place<V>]) {
+    fn turn(&mut self, places: &[JointFrame<V>]) {
         let (width, mut all) = (self.universal.len(), V::zero());
         for s in 0..self.count {
             for u in 0..width {
@@ -505,7 +591,7 @@ impl<V: Lanes> Choice<V> {
         sum
     }
 
-    /// Turns a pair where its couples are not square yet, and tells where.
+    /// Rotates a pair where its couples are not perpendicular yet, and tells where.
     #[inline(always)]
     fn make_square(&mut self, i: usize, j: usize, all: V) -> V {
         let (a, b) = (self.product_of_couples(i, i), self.product_of_couples(j, j));
@@ -513,7 +599,7 @@ impl<V: Lanes> Choice<V> {
         let counts = a.least(b).greater(all.scale(SQUARE * SQUARE));
         let cosine = V::select(counts, product * product, V::zero());
         let turns = cosine.greater((a * b).scale(SQUARE * SQUARE));
-        // The lesser turn that does it: t = tan of its angle, t² + 2 ζ t = 1.
+        // The smaller rotation that does it: t = tan of its angle, t² + 2 ζ t = 1.
         let zeta = (b - a) / (product + product);
         let t = zeta.signum() / (zeta.abs() + zeta.mul_add(zeta, V::one()).sqrt());
         let cos = V::one() / t.mul_add(t, V::one()).sqrt();
@@ -541,7 +627,7 @@ impl<V: Lanes> Choice<V> {
     /// Adds self-stresses until the reactions are least, but first until the couples in universal joints are, if asked to. A
     /// second time takes off the rounding of the first.
     #[inline(always)]
-    fn make_least(&mut self, places: &[Place<V>], couples_first: bool, reactions: &mut [Wrench<V>]) {
+    fn make_least(&mut self, places: &[JointFrame<V>], couples_first: bool, reactions: &mut [Wrench<V>]) {
         if self.count == 0 {
             return;
         }
@@ -572,7 +658,7 @@ impl<V: Lanes> Choice<V> {
 
     /// How much of each self-stress there is in the couples.
     #[inline(always)]
-    fn set_shares_of_couples(&mut self, places: &[Place<V>], reactions: &[Wrench<V>]) {
+    fn set_shares_of_couples(&mut self, places: &[JointFrame<V>], reactions: &[Wrench<V>]) {
         let width = self.universal.len();
         for s in 0..self.count {
             let mut sum = V::zero();
@@ -597,7 +683,7 @@ impl<V: Lanes> Choice<V> {
 
     /// The couple in a universal joint, divided by the characteristic length.
     #[inline(always)]
-    fn couple(&self, places: &[Place<V>], universal: usize, reactions: &[Wrench<V>]) -> V {
+    fn couple(&self, places: &[JointFrame<V>], universal: usize, reactions: &[Wrench<V>]) -> V {
         let j = self.universal[universal];
         places[j].axes.0[2].dot(reactions[j].torque).scale(1.0 / self.length)
     }

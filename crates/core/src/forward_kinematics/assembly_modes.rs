@@ -1,12 +1,13 @@
 //! All assembly modes: every real pose with given leg lengths \[T28\], \[T29\], \[T75\].
 //!
-//! The equations of [`forward`](crate::forward_kinematics::newton) are polynomials, so that over the complex numbers they have the same
-//! number of solutions for almost all lengths. All of them are found once for generic complex lengths; from there they
-//! are followed along a path of lengths to the ones that are asked for, and the real ones kept.
+//! The equations of [`forward`](crate::forward_kinematics::newton) are polynomials, so that over the complex
+//! numbers they have the same number of solutions for almost all lengths. All of them are found once for
+//! generic complex lengths; from there they are followed along a path of lengths to the given ones, and the
+//! real ones kept.
 
 use crate::forward_kinematics::gauss_newton;
-use crate::forward_kinematics::homotopy::{C, End, Lengths, Path, modulus};
-use crate::forward_kinematics::newton::{self, Asked, Found, system};
+use crate::forward_kinematics::homotopy::{C, HomotopyPath, Lengths, PathEnd, modulus};
+use crate::forward_kinematics::newton::{self, FoundPose, LegTarget, system};
 use crate::forward_kinematics::start_system::Products;
 use crate::kinematics::leg;
 use crate::mobility::sufficient_actuators::sufficient_actuators;
@@ -16,7 +17,7 @@ use crate::model::spec::Axes;
 use crate::model::status::Status;
 use crate::number::real::Real;
 use crate::number::real::count;
-use crate::numerics::random::Draw;
+use crate::numerics::random::Random;
 use crate::spatial::{Mat3, Pose, Vec3};
 
 /// Error of a predicted step that a path is followed with, as a pure number; the later ones where paths came too close
@@ -29,13 +30,14 @@ const CLOSE: f64 = 1e-4;
 /// Distance, as a pure number, below which two regular solutions are one.
 const SAME: f64 = 1e-7;
 
-/// The same for solutions that meet: they are known to the square root of rounding.
+/// Distance, as a pure number, below which two solutions that meet are one: they are known to the square root
+/// of rounding.
 const MEETING: f64 = 1e-5;
 
 /// Imaginary part, as a pure number, of a regular solution that is rounding of zero.
 const IMAGINARY: f64 = 1e-8;
 
-/// The same where solutions meet; whether it is real is decided by its residual.
+/// Imaginary part, as a pure number, of solutions that meet; their residual decides whether they are real.
 const IMAGINARY_MEETING: f64 = 1e-3;
 
 /// Residual of a real pose, relative to the longest leg, that is rounding of zero.
@@ -57,9 +59,9 @@ const MOST_ROUNDS: usize = 20;
 /// All solutions for generic complex lengths: where every search starts.
 #[derive(Clone, Debug)]
 pub struct Start {
-    asked: [Asked<C>; 6],
+    asked: [LegTarget<C>; 6],
     poses: Vec<Pose<C>>,
-    /// Which of the poses are their own images by the reflection: those of a platform in the base plane.
+    /// Marks of the poses that are their own mirror images: those of a platform in the base plane.
     own_images: Vec<bool>,
     mirror: Option<Mirror>,
     /// With as many of its legs actuated as it takes, where there are more.
@@ -101,8 +103,8 @@ impl Start {
     }
 }
 
-/// The reflection of a mechanism whose base joints lie in one plane and whose platform joints lie in another: it turns
-/// a pose above the base into one below it with the same leg lengths.
+/// The reflection of a mechanism whose base joints lie in one plane and whose platform joints lie in another:
+/// it maps a pose above the base to one below it with the same leg lengths.
 #[derive(Clone, Copy, Debug)]
 struct Mirror {
     base_normal: Vec3<f64>,
@@ -172,11 +174,11 @@ pub fn start(mech: &Mechanism) -> Option<Start> {
         let found = start(&square)?;
         return Some(Start { square: Some(Box::new(square)), ..found });
     }
-    search(mech, &mut Draw(0x9E37_79B9_7F4A_7C15))
+    search(mech, &mut Random(0x9E37_79B9_7F4A_7C15))
 }
 
-/// The same for a mechanism without redundant legs, by the given random numbers.
-fn search(mech: &Mechanism, draw: &mut Draw) -> Option<Start> {
+/// Generic solutions of a mechanism without redundant legs, by the given random numbers.
+fn search(mech: &Mechanism, draw: &mut Random) -> Option<Start> {
     let asked = generic(mech, draw);
     let mut result =
         Start { asked, poses: Vec::new(), own_images: Vec::new(), mirror: Mirror::of(mech), square: None };
@@ -184,7 +186,11 @@ fn search(mech: &Mechanism, draw: &mut Draw) -> Option<Start> {
     for _ in 0..MOST_ROUNDS {
         let family = Products::new(mech, asked, draw);
         let (starts, known) = (family.solutions(), result.poses.len());
-        for pose in (Path { family, precision: CLOSE }).follow(&starts).into_iter().filter_map(End::regular) {
+        for pose in (HomotopyPath { family, precision: CLOSE })
+            .follow(&starts)
+            .into_iter()
+            .filter_map(PathEnd::regular)
+        {
             result.extend(mech, pose);
         }
         unchanged = if result.poses.len() == known { unchanged + 1 } else { 0 };
@@ -195,18 +201,19 @@ fn search(mech: &Mechanism, draw: &mut Draw) -> Option<Start> {
     None
 }
 
-/// What the home pose meets.
-fn at_home(mech: &Mechanism, leg: &Leg) -> Asked<C> {
-    let Asked { place, square } = Asked::of(leg, leg.drive.number(leg::position(leg, &mech.home).coordinate));
-    Asked { place: C::lit(place), square: C::lit(square) }
+/// Target of a leg at the home pose.
+fn at_home(mech: &Mechanism, leg: &Leg) -> LegTarget<C> {
+    let LegTarget { place, square } =
+        LegTarget::of(leg, leg.drive.number(leg::position(leg, &mech.home).coordinate));
+    LegTarget { place: C::lit(place), square: C::lit(square) }
 }
 
 /// Complex squares of lengths a little off those at home, and places of carriages.
-fn generic(mech: &Mechanism, draw: &mut Draw) -> [Asked<C>; 6] {
-    let (mut asked, drawn) = ([Asked::none(); 6], [(); 6].map(|()| draw.complex().scale(GENERIC)));
+fn generic(mech: &Mechanism, draw: &mut Random) -> [LegTarget<C>; 6] {
+    let (mut asked, drawn) = ([LegTarget::none(); 6], [(); 6].map(|()| draw.complex().scale(GENERIC)));
     for ((asked, (_, leg)), drawn) in asked.iter_mut().zip(mech.actuated()).zip(drawn) {
-        let Asked { place, square } = at_home(mech, leg);
-        *asked = Asked { place, square: square * (C::lit(1.0) + drawn) };
+        let LegTarget { place, square } = at_home(mech, leg);
+        *asked = LegTarget { place, square: square * (C::lit(1.0) + drawn) };
         if leg.drive.moves_foot() {
             asked.place = place + draw.complex().scale(leg.drive.travel() * GENERIC);
         }
@@ -227,7 +234,7 @@ fn distance(mech: &Mechanism, a: &Pose<C>, b: &Pose<C>) -> f64 {
     (turned / (size * size)).max(moved / size)
 }
 
-/// Where an idle line is at a pose, seen from the other body: its direction and its point.
+/// Direction and point of the line of a local degree of freedom at a pose, seen from the other body.
 fn line<T: Real>(idle: &Idle, pose: &Pose<T>) -> (Vec3<T>, Vec3<T>) {
     let (axis, point) = (Vec3::lift(idle.axis), Vec3::lift(idle.point));
     match idle.side {
@@ -236,14 +243,15 @@ fn line<T: Real>(idle: &Idle, pose: &Pose<T>) -> (Vec3<T>, Vec3<T>) {
     }
 }
 
-/// The same distance of what an idle spin leaves: of the line \[T71\].
+/// Distance of two poses apart from the spin of a local degree of freedom: that of its line \[T71\].
 fn distance_of_lines(mech: &Mechanism, idle: &Idle, a: &Pose<C>, b: &Pose<C>) -> f64 {
     let ((u, p), (v, q)) = (line(idle, a), line(idle, b));
     let size = modulus(u).max(1.0);
     (modulus(u - v) / (size * size)).max(modulus(p - q) / (mech.characteristic_length + modulus(p)) / size)
 }
 
-/// The pose with the idle line where it is, and the spin that is the shortest turn from home: a real one where the line is real.
+/// The pose with the idle line where it is, and the spin that is the shortest rotation from home: a real one
+/// where the line is real.
 fn unspun(mech: &Mechanism, pose: &Pose<C>) -> Pose<C> {
     let [idle] = &mech.idle[..] else { return *pose };
     let real = |a: Vec3<C>| a.map(|e| e.re);
@@ -268,7 +276,7 @@ fn unspun(mech: &Mechanism, pose: &Pose<C>) -> Pose<C> {
     found
 }
 
-/// A real pose with the lengths that were asked for.
+/// A real pose with the given lengths.
 #[derive(Clone, Copy, Debug)]
 pub struct Mode {
     pub pose: Pose<f64>,
@@ -304,7 +312,7 @@ pub fn assembly_modes_of_all(mech: &Mechanism, start: &Start, lengths: &[f64]) -
     let Modes { mut modes, mut status } = assembly_modes(square, start, &of(square));
     let some = !modes.is_empty();
     modes.retain_mut(|mode| {
-        let Found { pose, residual, sign, status, .. } =
+        let FoundPose { pose, residual, sign, status, .. } =
             gauss_newton::forward_kinematics(mech, &all, &mode.pose);
         let near = distance(mech, &Pose::lift(&pose), &Pose::lift(&mode.pose)) <= MEETING;
         (mode.pose, mode.residual, mode.sign, mode.singular) =
@@ -326,12 +334,13 @@ pub fn assembly_modes(mech: &Mechanism, start: &Start, lengths: &[f64]) -> Modes
         return Modes { modes: vec![], status: Status::InvalidInput };
     }
     let asked = newton::asked(mech, lengths);
-    let to = asked.map(|Asked { place, square }| Asked { place: C::lit(place), square: C::lit(square) });
+    let to =
+        asked.map(|LegTarget { place, square }| LegTarget { place: C::lit(place), square: C::lit(square) });
     let mut ends = Vec::new();
     let mut complete = false;
     for precision in PRECISIONS {
         let family = Lengths { mech, from: start.asked, to };
-        let path = Path { family, precision };
+        let path = HomotopyPath { family, precision };
         ends = path.follow(&start.poses);
         complete = all_kept(mech, &ends);
         if complete {
@@ -341,7 +350,7 @@ pub fn assembly_modes(mech: &Mechanism, start: &Start, lengths: &[f64]) -> Modes
     let up = upward(mech);
     let mut modes: Vec<Mode> = Vec::new();
     for (end, own_image) in ends.into_iter().zip(&start.own_images) {
-        let (End::Regular(pose) | End::Singular(pose)) = end else { continue };
+        let (PathEnd::Regular(pose) | PathEnd::Singular(pose)) = end else { continue };
         let mirrored = start.mirror.filter(|_| !own_image).map(|m| m.apply(&pose));
         for pose in std::iter::once(pose).chain(mirrored) {
             if let Some(mode) = real_mode(mech, &asked, &pose, up) {
@@ -358,7 +367,7 @@ pub fn assembly_modes(mech: &Mechanism, start: &Start, lengths: &[f64]) -> Modes
     Modes { modes, status }
 }
 
-/// How modes are ordered: by height, and equally high ones by the rest of the pose.
+/// Sort key of assembly modes: by height, then by the rest of the pose.
 fn order(mech: &Mechanism, pose: &Pose<f64>, up: Vec3<f64>) -> [i64; 13] {
     let o = pose.o * (1.0 / mech.characteristic_length);
     let mut numbers =
@@ -367,19 +376,19 @@ fn order(mech: &Mechanism, pose: &Pose<f64>, up: Vec3<f64>) -> [i64; 13] {
 }
 
 /// Whether no path was lost, nor left for another: then two would have one regular end.
-fn all_kept(mech: &Mechanism, ends: &[End]) -> bool {
+fn all_kept(mech: &Mechanism, ends: &[PathEnd]) -> bool {
     ends.iter().enumerate().all(|(i, end)| match end {
-        End::Regular(a) => !ends[..i].iter().any(|other| match other {
-            End::Regular(b) => distance(mech, a, b) < SAME,
+        PathEnd::Regular(a) => !ends[..i].iter().any(|other| match other {
+            PathEnd::Regular(b) => distance(mech, a, b) < SAME,
             _ => false,
         }),
-        End::Singular(_) | End::Infinite => true,
-        End::Lost => false,
+        PathEnd::Singular(_) | PathEnd::Infinite => true,
+        PathEnd::Lost => false,
     })
 }
 
 /// The real pose that a complex solution is, if it is one.
-fn real_mode(mech: &Mechanism, asked: &[Asked<f64>; 6], pose: &Pose<C>, up: Vec3<f64>) -> Option<Mode> {
+fn real_mode(mech: &Mechanism, asked: &[LegTarget<f64>; 6], pose: &Pose<C>, up: Vec3<f64>) -> Option<Mode> {
     let pose = &unspun(mech, pose);
     let o = pose.o * C::lit(1.0 / mech.characteristic_length);
     let parts = pose.rotation.0.iter().flat_map(|c| c.array()).chain(o.array());
@@ -391,7 +400,7 @@ fn real_mode(mech: &Mechanism, asked: &[Asked<f64>; 6], pose: &Pose<C>, up: Vec3
     let [x, y, _] = pose.rotation.0.map(real);
     let (x, z) = (x.unit(), x.cross(y).unit());
     let guess = Pose { rotation: Mat3::from_columns(x, z.cross(x), z), o: real(pose.o) };
-    let Found { pose: found, sign, residual, status, .. } = newton::polish(mech, asked, &guess);
+    let FoundPose { pose: found, sign, residual, status, .. } = newton::polish(mech, asked, &guess);
     let longest = asked.iter().map(|a| a.square).fold(0.0, f64::max).sqrt();
     let moved = distance(mech, &Pose::lift(&found), pose);
     // Off the real poses there are real ones nearby only where modes meet.
@@ -446,7 +455,7 @@ mod tests {
             common::on_rod(2, 4),
         ];
         for (mech, known) in mechanisms.iter().zip(known) {
-            let numbers = (1..=4).map(|seed| search(mech, &mut Draw(seed)).map(|found| found.solutions()));
+            let numbers = (1..=4).map(|seed| search(mech, &mut Random(seed)).map(|found| found.solutions()));
             let numbers: Vec<_> = numbers.collect();
             let expected = known.or(numbers[0]);
             println!("{}: {expected:?}", mech.name);

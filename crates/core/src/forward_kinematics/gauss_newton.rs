@@ -1,10 +1,10 @@
-//! Forward kinematics where lengths are not six equations with one solution nearby: legs that contradict one another unless
-//! they agree \[T73\], and designs that are singular at every pose. By Gauss and Newton's method, with the rows themselves.
+//! Gauss-Newton forward kinematics for over-determined mechanisms, whose lengths must be consistent \[T73\],
+//! and for designs that are singular at every pose. With the rows themselves, not their products.
 
 use nalgebra::{DMatrix, DVector};
 
 use crate::forward_kinematics::newton::{
-    Asked, FOLD_PIVOTS, Found, LONGEST_STEP, are_coordinates, asked_of_all, error, step_of,
+    FOLD_PIVOTS, FoundPose, LONGEST_STEP, LegTarget, are_coordinates, asked_of_all, error, step_of,
 };
 use crate::forward_kinematics::newton_lanes::{Guessed, put_numbers};
 use crate::kinematics::constraint;
@@ -27,7 +27,7 @@ const STEPS: u32 = 200;
 /// their constraints by.
 const AGREEMENT: f64 = 1e-6;
 
-/// The same of a constraint.
+/// Largest residual of a constraint, as a pure number.
 const KEPT: f64 = 1e-11;
 
 /// Steps below this size are made whatever they do: the iteration contracts there, to rounding if the legs agree, and if they
@@ -79,7 +79,7 @@ impl<V: Lanes> Errors<V> {
     }
 
     #[inline(always)]
-    fn set(&mut self, mech: &Mechanism, asked: &[Asked<V>], pose: &Pose<V>) {
+    fn set(&mut self, mech: &Mechanism, asked: &[LegTarget<V>], pose: &Pose<V>) {
         let scale = mech.characteristic_length;
         for (k, (_, leg)) in mech.actuated().enumerate() {
             let (e, r) = leg::vectors(leg, pose);
@@ -147,7 +147,8 @@ impl Misses<f64> {
         let legs = DVector::from_column_slice(&errors.legs);
         let others = DVector::from_column_slice(&errors.others);
         let of_legs = DMatrix::from_fn(legs.len(), 6, |i, j| errors.rows[i][j]);
-        // First what the others ask for, then what the legs ask for within that; each of least size.
+        // First the step that the other rows require, then that of the legs within their null space; each of
+        // least norm.
         let rest: Vec<[f64; 6]> = rows::others(mech).map(|row| row.pure(pose, scale)).collect();
         let held = Svd::of(&DMatrix::from_fn(others.len(), 6, |i, j| rest[i][j]))?;
         let (first, rank) = least(&held, &others);
@@ -223,9 +224,10 @@ impl<'a> Search<'a> {
         self.trial = Some(self.pose.stepped(&step_of(self.mech, at.step, self.share)));
     }
 
-    fn found(&self) -> Found {
+    /// The result, with the largest error of a length or a constraint at its pose, m.
+    fn found(&self, residual: f64) -> FoundPose {
         let (mech, pose) = (self.mech, self.pose);
-        let nothing = |status| Found { pose, residual: f64::NAN, iterations: 0, sign: f64::NAN, status };
+        let nothing = |status| FoundPose { pose, residual: f64::NAN, iterations: 0, sign: f64::NAN, status };
         if !are_coordinates(mech, self.lengths) {
             return nothing(Status::InvalidInput);
         }
@@ -238,15 +240,14 @@ impl<'a> Search<'a> {
             (false, false) => Status::NotConverged,
         };
         let sign = if mech.mobility.uncontrolled > 0 { 0.0 } else { 1.0 };
-        let asked: Vec<Asked<f64>> = asked_of_all(mech, self.lengths).collect();
-        Found { pose, residual: error(mech, &asked, &pose), iterations: self.iterations, sign, status }
+        FoundPose { pose, residual, iterations: self.iterations, sign, status }
     }
 }
 
 /// A pose near the guess with the given lengths of all actuated legs. Where the nearest one does not have them, they contradict
 /// one another, and the status says so.
 #[must_use]
-pub fn forward_kinematics(mech: &Mechanism, lengths: &[f64], guess: &Pose<f64>) -> Found {
+pub fn forward_kinematics(mech: &Mechanism, lengths: &[f64], guess: &Pose<f64>) -> FoundPose {
     let state = (lengths.to_vec(), *guess);
     let [found] = &forward_kinematics_of(mech, std::slice::from_ref(&state))[..] else {
         unreachable!("one answer for one state")
@@ -256,7 +257,7 @@ pub fn forward_kinematics(mech: &Mechanism, lengths: &[f64], guess: &Pose<f64>) 
 
 /// The same of at most [`WIDTH`] states side by side, each as if it were alone.
 #[must_use]
-pub fn forward_kinematics_of(mech: &Mechanism, states: &[Guessed]) -> Vec<Found> {
+pub fn forward_kinematics_of(mech: &Mechanism, states: &[Guessed]) -> Vec<FoundPose> {
     let mut searches: Vec<Search> =
         states.iter().map(|(lengths, guess)| Search::new(mech, lengths, guess)).collect();
     let mut numbers = vec![[1.0; WIDTH]; mech.actuated().count()];
@@ -278,22 +279,27 @@ pub fn forward_kinematics_of(mech: &Mechanism, states: &[Guessed]) -> Vec<Found>
             }
         }
     }
-    let alone = |(search, (lengths, guess)): (&Search, &Guessed)| {
+    for (k, search) in searches.iter().enumerate() {
+        put(&mut poses, k, &search.pose);
+    }
+    let mut residuals = [0.0; WIDTH];
+    lanes::dispatch(Residuals { mech, poses: &poses, numbers: &numbers, result: &mut residuals });
+    let alone = |((search, residual), (lengths, guess)): ((&Search, f64), &Guessed)| {
         let singular = search.dependent || mech.mobility.uncontrolled > 0;
-        if singular { by_singular_values(mech, lengths, guess) } else { search.found() }
+        if singular { by_singular_values(mech, lengths, guess) } else { search.found(residual) }
     };
-    searches.iter().zip(states).map(alone).collect()
+    searches.iter().zip(residuals).zip(states).map(alone).collect()
 }
 
 /// The same of one state for rows of any rank.
-fn by_singular_values(mech: &Mechanism, lengths: &[f64], guess: &Pose<f64>) -> Found {
-    let asked: Vec<Asked<f64>> = asked_of_all(mech, lengths).collect();
+fn by_singular_values(mech: &Mechanism, lengths: &[f64], guess: &Pose<f64>) -> FoundPose {
+    let asked: Vec<LegTarget<f64>> = asked_of_all(mech, lengths).collect();
     let (mut search, mut errors) = (Search::new(mech, lengths, guess), Errors::new(mech));
     while let Some(trial) = search.trial {
         errors.set(mech, &asked, &trial);
         search.judge(Misses::by_singular_values(mech, &trial, &errors));
     }
-    search.found()
+    search.found(error(mech, &asked, &search.pose))
 }
 
 /// What poses side by side miss.
@@ -310,12 +316,10 @@ impl Task for Evaluation<'_> {
     fn run<V: Lanes>(self) {
         let Evaluation { mech, poses, numbers, result } = self;
         let (mut rows, mut errors) = (RedundantRows::<V>::new(mech), Errors::new(mech));
-        let mut asked = vec![Asked::none(); numbers.len()];
+        let mut asked = vec![LegTarget::none(); numbers.len()];
         for k in (0..WIDTH).step_by(V::WIDTH) {
             let pose = load(poses, k);
-            for ((asked, numbers), (_, leg)) in asked.iter_mut().zip(numbers).zip(mech.actuated()) {
-                *asked = Asked::of(leg, V::load(&numbers[k..]));
-            }
+            set_targets(mech, numbers, k, &mut asked);
             errors.set(mech, &asked, &pose);
             let found = Misses::by_reflections(mech, &pose, &errors, &mut rows);
             let numbers = [found.legs, found.others, found.merit, found.size, found.left, found.pivots];
@@ -328,6 +332,33 @@ impl Task for Evaluation<'_> {
                 result[k + lane] = Misses { legs, others, merit, step, size, left, pivots };
             }
         }
+    }
+}
+
+/// The largest errors of poses side by side, m.
+struct Residuals<'a> {
+    mech: &'a Mechanism,
+    poses: &'a Poses,
+    numbers: &'a [lanes::Row],
+    result: &'a mut lanes::Row,
+}
+
+impl Task for Residuals<'_> {
+    #[inline(always)]
+    fn run<V: Lanes>(self) {
+        let mut asked = vec![LegTarget::none(); self.numbers.len()];
+        for k in (0..WIDTH).step_by(V::WIDTH) {
+            set_targets(self.mech, self.numbers, k, &mut asked);
+            error::<V>(self.mech, &asked, &load(self.poses, k)).store(&mut self.result[k..]);
+        }
+    }
+}
+
+/// Targets of the legs of the states from the k-th on.
+#[inline(always)]
+fn set_targets<V: Lanes>(mech: &Mechanism, numbers: &[lanes::Row], k: usize, targets: &mut [LegTarget<V>]) {
+    for ((target, numbers), (_, leg)) in targets.iter_mut().zip(numbers).zip(mech.actuated()) {
+        *target = LegTarget::of(leg, V::load(&numbers[k..]));
     }
 }
 

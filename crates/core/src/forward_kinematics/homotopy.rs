@@ -1,6 +1,7 @@
-//! Paths of complex solutions as equations change, such as squared leg lengths, several side by side \[T29\].
+//! Homotopy continuation: paths of complex solutions while the equations change, such as squared leg lengths,
+//! several side by side; Runge-Kutta predictor, Newton corrector \[T29\].
 
-use crate::forward_kinematics::newton::{Asked, FOLD_PIVOTS, System, system};
+use crate::forward_kinematics::newton::{FOLD_PIVOTS, LegTarget, System, system};
 use crate::kinematics::leg;
 use crate::model::mechanism::Mechanism;
 use crate::model::spec::Axes;
@@ -15,10 +16,11 @@ pub type C = Complex<f64>;
 /// Coordinates, as pure numbers, of a pose beyond which a path is taken to go to infinity: no real pose is there.
 pub const INFINITE: f64 = 1e7;
 
-/// The same for a path that cannot be followed further in double precision.
+/// Coordinates, as pure numbers, beyond which a path that cannot be followed further in double precision is
+/// taken to go to infinity.
 const FAR: f64 = 300.0;
 
-/// The same below which a pose may be a real one.
+/// Coordinates, as pure numbers, below which a pose may be a real one.
 const NEARBY: f64 = 100.0;
 
 /// Share of a path that is tried first.
@@ -36,15 +38,15 @@ const LAST_STEPS: usize = 40;
 /// Size of a Newton step, as a pure number, from which the next one is rounding.
 const ROUNDING: f64 = 1e-14;
 
-/// The same by which it has converged quadratically.
+/// Size of a Newton step, as a pure number, from which the iteration counts as quadratically converged.
 const CONVERGED: f64 = 1e-9;
 
-/// The same that no step on the way need fall below.
+/// Size of a Newton step, as a pure number, that is small enough on the way.
 const CLOSE: f64 = 1e-8;
 
 /// How a path ends.
 #[derive(Clone, Copy, Debug)]
-pub enum End {
+pub enum PathEnd {
     Regular(Pose<C>),
     /// At a solution where several paths end.
     Singular(Pose<C>),
@@ -53,12 +55,12 @@ pub enum End {
     Lost,
 }
 
-impl End {
+impl PathEnd {
     /// The pose, if it is a regular one.
     #[must_use]
     pub fn regular(self) -> Option<Pose<C>> {
         match self {
-            End::Regular(pose) => Some(pose),
+            PathEnd::Regular(pose) => Some(pose),
             _ => None,
         }
     }
@@ -71,16 +73,17 @@ pub trait Family {
     /// Whether solutions that differ by an idle spin are one \[T71\].
     fn spins(&self) -> bool;
 
-    /// The equations at a place, and the rates at which their residuals fall there. Must be `#[inline(always)]`.
-    fn at<V: Lanes>(&self, place: &Place<Complex<V>>, t: V) -> (System<Complex<V>>, [Complex<V>; 6]);
+    /// The equations at a point of the path, and the rates at which their residuals fall there. Must be
+    /// `#[inline(always)]`.
+    fn at<V: Lanes>(&self, place: &PathPoint<Complex<V>>, t: V) -> (System<Complex<V>>, [Complex<V>; 6]);
 }
 
-/// What is asked of the legs along a straight path.
+/// Targets of the legs along a straight path of squared lengths.
 #[derive(Clone, Copy, Debug)]
 pub struct Lengths<'a> {
     pub mech: &'a Mechanism,
-    pub from: [Asked<C>; 6],
-    pub to: [Asked<C>; 6],
+    pub from: [LegTarget<C>; 6],
+    pub to: [LegTarget<C>; 6],
 }
 
 impl Family for Lengths<'_> {
@@ -93,21 +96,21 @@ impl Family for Lengths<'_> {
     }
 
     #[inline(always)]
-    fn at<V: Lanes>(&self, place: &Place<Complex<V>>, t: V) -> (System<Complex<V>>, [Complex<V>; 6]) {
+    fn at<V: Lanes>(&self, place: &PathPoint<Complex<V>>, t: V) -> (System<Complex<V>>, [Complex<V>; 6]) {
         let Lengths { mech, from, to } = self;
         let unit = 1.0 / (mech.characteristic_length * mech.characteristic_length);
         let pose = place.pose();
-        let mut asked = [Asked::none(); 6];
+        let mut asked = [LegTarget::none(); 6];
         let mut rates = [Complex::<V>::zero(); 6];
         let mut i = 0;
         for leg in &mech.legs {
             if leg.actuated {
                 let (square, square_rate) = between(from[i].square, to[i].square, t);
                 let (place, place_rate) = between(from[i].place, to[i].place, t);
-                asked[i] = Asked { place, square };
-                let rate = Asked { place: place_rate, square: square_rate };
+                asked[i] = LegTarget { place, square };
+                let rate = LegTarget { place: place_rate, square: square_rate };
                 let r = asked[i].vector(leg, leg::vectors(leg, &pose).1);
-                rates[i] = Asked::change(leg, r, &rate).scale(unit);
+                rates[i] = LegTarget::change(leg, r, &rate).scale(unit);
                 i += 1;
             }
         }
@@ -117,7 +120,7 @@ impl Family for Lengths<'_> {
 
 /// The paths of the solutions of such equations.
 #[derive(Clone, Copy, Debug)]
-pub struct Path<F> {
+pub struct HomotopyPath<F> {
     pub family: F,
     /// Error of a predicted step, as a pure number.
     pub precision: f64,
@@ -125,7 +128,7 @@ pub struct Path<F> {
 
 /// Where one of several solutions on their way is.
 #[derive(Clone, Copy, Debug)]
-struct Traveller {
+struct TrackedPath {
     /// Which of them it is.
     start: usize,
     t: f64,
@@ -137,9 +140,9 @@ struct Traveller {
     before: (f64, f64),
 }
 
-impl Traveller {
+impl TrackedPath {
     fn new(start: usize) -> Self {
-        Traveller { start, t: 0.0, h: FIRST_STEP, error: 0.0, before: (0.0, 0.0) }
+        TrackedPath { start, t: 0.0, h: FIRST_STEP, error: 0.0, before: (0.0, 0.0) }
     }
 
     /// Whether a second Newton step is as much smaller than the first as it must be.
@@ -153,7 +156,7 @@ impl Traveller {
         let factor = 0.8 * (precision / error).powf(0.2);
         let factor = if factor.is_nan() { 0.25 } else { factor.clamp(0.25, 4.0) };
         if good {
-            *self = Traveller {
+            *self = TrackedPath {
                 t: self.t + self.h,
                 h: self.h * factor,
                 error,
@@ -174,17 +177,17 @@ impl Traveller {
     /// Takes the last step back.
     fn back(&mut self) {
         let (t, h) = self.before;
-        *self = Traveller { t, h: 0.25 * h, error: 0.0, before: (t, 0.25 * h), ..*self };
+        *self = TrackedPath { t, h: 0.25 * h, error: 0.0, before: (t, 0.25 * h), ..*self };
     }
 }
 
-impl<F: Family> Path<F> {
+impl<F: Family> HomotopyPath<F> {
     /// Follows the path from solutions at t = 0 by the classical Runge-Kutta method and Newton corrections.
     #[must_use]
-    pub fn follow(&self, starts: &[Pose<C>]) -> Vec<End> {
-        let mut ends = vec![End::Lost; starts.len()];
+    pub fn follow(&self, starts: &[Pose<C>]) -> Vec<PathEnd> {
+        let mut ends = vec![PathEnd::Lost; starts.len()];
         let mut waiting = starts.iter().enumerate();
-        let mut travellers: [Option<Traveller>; WIDTH] = [None; WIDTH];
+        let mut travellers: [Option<TrackedPath>; WIDTH] = [None; WIDTH];
         let (mut place, mut rate) = (ZERO, ZERO);
         let mut before = (place, rate);
         let mut at = Evaluated::default();
@@ -193,8 +196,8 @@ impl<F: Family> Path<F> {
                 travellers.iter_mut().enumerate().filter(|(_, traveller)| traveller.is_none())
             {
                 if let Some((start, pose)) = waiting.next() {
-                    *traveller = Some(Traveller::new(start));
-                    self.unspun(Place::of(pose)).put(&mut place, k);
+                    *traveller = Some(TrackedPath::new(start));
+                    self.unspun(PathPoint::of(pose)).put(&mut place, k);
                 }
             }
             if travellers.iter().all(Option::is_none) {
@@ -207,7 +210,7 @@ impl<F: Family> Path<F> {
                 let Some(who) = traveller else { continue };
                 let arrived = who.t >= 1.0 && at.size[k] <= CONVERGED && at.pivots[k] > FOLD_PIVOTS;
                 if !arrived && who.waits() {
-                    (ends[who.start], *traveller) = (self.end(who, &Place::get(&place, k)), None);
+                    (ends[who.start], *traveller) = (self.end(who, &PathPoint::get(&place, k)), None);
                     continue;
                 }
                 if who.contracts(at.size[k], self.precision) {
@@ -219,7 +222,8 @@ impl<F: Family> Path<F> {
                 }
                 who.h = who.h.min(1.0 - who.t);
                 if arrived {
-                    (ends[who.start], *traveller) = (End::Regular(Place::get(&place, k).pose()), None);
+                    (ends[who.start], *traveller) =
+                        (PathEnd::Regular(PathPoint::get(&place, k).pose()), None);
                 }
             }
             before.0.clone_from(&place);
@@ -233,12 +237,12 @@ impl<F: Family> Path<F> {
                 if who.judge(at.size[k], self.precision) {
                     copy(&next, &mut place, k);
                 }
-                let here = Place::get(&place, k);
+                let here = PathPoint::get(&place, k);
                 if self.family.spins() {
                     self.unspun(here).put(&mut place, k);
                 }
                 if !(here.size(self.family.mech()) < INFINITE) {
-                    (ends[who.start], *traveller) = (End::Infinite, None);
+                    (ends[who.start], *traveller) = (PathEnd::Infinite, None);
                 } else if who.t < 1.0 && who.h <= SMALLEST_STEP {
                     (ends[who.start], *traveller) = (self.end(who, &here), None);
                 }
@@ -246,7 +250,7 @@ impl<F: Family> Path<F> {
         }
     }
 
-    fn unspun(&self, place: Place<C>) -> Place<C> {
+    fn unspun(&self, place: PathPoint<C>) -> PathPoint<C> {
         if self.family.spins() { place.unspun(self.family.mech()) } else { place }
     }
 
@@ -268,12 +272,12 @@ impl<F: Family> Path<F> {
         sum
     }
 
-    /// What the path comes to where it cannot be followed further, or paths seem to meet.
-    fn end(&self, who: &Traveller, place: &Place<C>) -> End {
+    /// End of a path that cannot be followed further, or of paths that seem to meet.
+    fn end(&self, who: &TrackedPath, place: &PathPoint<C>) -> PathEnd {
         let mech = self.family.mech();
         let size = place.size(mech);
         if who.t < 1.0 - NEAR_END {
-            return if size > FAR { End::Infinite } else { End::Lost };
+            return if size > FAR { PathEnd::Infinite } else { PathEnd::Lost };
         }
         let (mut place, mut last) = (*place, f64::NAN);
         for _ in 0..LAST_STEPS {
@@ -289,10 +293,10 @@ impl<F: Family> Path<F> {
         let (System { residual, matrix }, _) = self.family.at(&place, 1.0);
         let determined = size > NEARBY || solve(matrix, residual).pivots > FOLD_PIVOTS;
         let regular = who.t >= 1.0 && last <= CONVERGED && determined;
-        if regular { End::Regular(place.pose()) } else { End::Singular(place.pose()) }
+        if regular { PathEnd::Regular(place.pose()) } else { PathEnd::Singular(place.pose()) }
     }
 
-    /// Newton steps and rates at places.
+    /// Newton steps and rates at points.
     fn evaluate(&self, place: &Block, t: &Row, result: &mut Evaluated) {
         lanes::dispatch(Evaluation { family: &self.family, place, t, result });
     }
@@ -300,12 +304,12 @@ impl<F: Family> Path<F> {
 
 /// A complex pose with its rotation as a quaternion of any size but zero, so that steps are sums \[T29\].
 #[derive(Clone, Copy, Debug)]
-pub struct Place<T> {
+pub struct PathPoint<T> {
     pub q: [T; 4],
     pub o: Vec3<T>,
 }
 
-impl<T: Real> Place<T> {
+impl<T: Real> PathPoint<T> {
     #[must_use]
     #[inline(always)]
     pub fn pose(&self) -> Pose<T> {
@@ -324,25 +328,25 @@ impl<T: Real> Place<T> {
         Pose { rotation, o: self.o }
     }
 
-    /// The change of the place along (v/Λ, ω): `q' = ω q/2`.
+    /// The change of the point along (v/Λ, ω): `q' = ω q/2`.
     #[inline(always)]
     pub(crate) fn along(&self, mech: &Mechanism, x: &[T; 6]) -> Self {
         let [w, i, j, k] = self.q;
         let (omega, vector) = (Vec3::new(x[3], x[4], x[5]).scale(0.5), Vec3::new(i, j, k));
         let turned = omega * w + omega.cross(vector);
         let o = Vec3::new(x[0], x[1], x[2]).scale(mech.characteristic_length);
-        Place { q: [-omega.dot(vector), turned.x, turned.y, turned.z], o }
+        PathPoint { q: [-omega.dot(vector), turned.x, turned.y, turned.z], o }
     }
 }
 
-impl<T: Real> std::ops::Add for Place<T> {
+impl<T: Real> std::ops::Add for PathPoint<T> {
     type Output = Self;
     fn add(self, b: Self) -> Self {
-        Place { q: std::array::from_fn(|i| self.q[i] + b.q[i]), o: self.o + b.o }
+        PathPoint { q: std::array::from_fn(|i| self.q[i] + b.q[i]), o: self.o + b.o }
     }
 }
 
-impl Place<C> {
+impl PathPoint<C> {
     /// From the largest of four products of the quaternion with each of its parts.
     pub(crate) fn of(pose: &Pose<C>) -> Self {
         let m = pose.rotation.rows();
@@ -355,11 +359,11 @@ impl Place<C> {
         let largest =
             (0..4).fold(0, |a, b| if products[b][b].norm() > products[a][a].norm() { b } else { a });
         let share = one / products[largest][largest].sqrt();
-        Place { q: products[largest].map(|p| p * share), o: pose.o }
+        PathPoint { q: products[largest].map(|p| p * share), o: pose.o }
     }
 
-    /// The place after that imaginary idle spin which makes the quaternion least: spins are no part of a solution, and
-    /// imaginary ones let it grow without bounds \[T71\].
+    /// The point after that imaginary idle spin which makes the quaternion least: spins are no part of a
+    /// solution, and imaginary ones let it grow without bounds \[T71\].
     fn unspun(self, mech: &Mechanism) -> Self {
         let [idle] = &mech.idle[..] else { return self };
         let [w, x, y, z] = self.q;
@@ -377,14 +381,14 @@ impl Place<C> {
         }
         let [first, second] = parts;
         let q = std::array::from_fn(|k| first[k].scale(share) + second[k].scale(1.0 / share));
-        // The line stays where it is: o turns about it.
-        let (before, after) = (self.pose(), Place { q, ..self }.pose());
+        // The line stays where it is: o rotates about it.
+        let (before, after) = (self.pose(), PathPoint { q, ..self }.pose());
         let point = Vec3::lift(idle.point);
         let o = match idle.side {
             Axes::Platform => self.o + before.rotation * point - after.rotation * point,
             Axes::Base => point - after.rotation * before.rotation.transpose_mul(point - self.o),
         };
-        Place { q, o }
+        PathPoint { q, o }
     }
 
     /// How large its coordinates are, as a pure number: of o, and of the rotation, by |q|²/|q·q|.
@@ -396,7 +400,7 @@ impl Place<C> {
 
     fn get(block: &Block, k: usize) -> Self {
         let [w, x, y, z, a, b, c] = std::array::from_fn(|i| C::new(block[2 * i][k], block[2 * i + 1][k]));
-        Place { q: [w, x, y, z], o: Vec3::new(a, b, c) }
+        PathPoint { q: [w, x, y, z], o: Vec3::new(a, b, c) }
     }
 
     fn put(&self, block: &mut Block, k: usize) {
@@ -409,7 +413,7 @@ impl Place<C> {
 
 /// The size of a step (v/Λ, ω), relative to how far off o is.
 #[inline(always)]
-fn step_size<T: Ordered>(mech: &Mechanism, place: &Place<Complex<T>>, x: &[Complex<T>; 6]) -> T {
+fn step_size<T: Ordered>(mech: &Mechanism, place: &PathPoint<Complex<T>>, x: &[Complex<T>; 6]) -> T {
     let mut sum = T::zero();
     for z in x {
         sum = sum + z.norm_sqr();
@@ -430,7 +434,7 @@ type Block = [Row; 14];
 const ZERO: Block = [[0.0; WIDTH]; 14];
 const ONE: Row = [1.0; WIDTH];
 
-fn row(travellers: &[Option<Traveller>; WIDTH], part: impl Fn(&Traveller) -> f64) -> Row {
+fn row(travellers: &[Option<TrackedPath>; WIDTH], part: impl Fn(&TrackedPath) -> f64) -> Row {
     std::array::from_fn(|k| travellers[k].as_ref().map_or(0.0, &part))
 }
 
@@ -458,7 +462,7 @@ fn copy(from: &Block, to: &mut Block, k: usize) {
     }
 }
 
-/// Newton steps at places and their sizes, and the rates of the places along the path.
+/// Newton steps at points and their sizes, and the rates of the points along the path.
 #[derive(Clone, Copy, Debug, Default)]
 struct Evaluated {
     correction: Block,
@@ -480,7 +484,7 @@ impl<F: Family> Task for Evaluation<'_, F> {
         let mech = self.family.mech();
         let mut k = 0;
         while k < WIDTH {
-            let place: Place<Complex<V>> = load(self.place, k);
+            let place: PathPoint<Complex<V>> = load(self.place, k);
             let (System { mut residual, matrix }, rates) = self.family.at(&place, V::load(&self.t[k..]));
             for f in &mut residual {
                 *f = -*f;
@@ -507,17 +511,17 @@ fn between<V: Lanes>(from: C, to: C, t: V) -> (Complex<V>, Complex<V>) {
 }
 
 #[inline(always)]
-fn load<V: Lanes>(block: &Block, k: usize) -> Place<Complex<V>> {
+fn load<V: Lanes>(block: &Block, k: usize) -> PathPoint<Complex<V>> {
     let mut parts = [Complex::<V>::zero(); 7];
     for i in 0..7 {
         parts[i] = Complex::new(V::load(&block[2 * i][k..]), V::load(&block[2 * i + 1][k..]));
     }
     let [w, x, y, z, a, b, c] = parts;
-    Place { q: [w, x, y, z], o: Vec3::new(a, b, c) }
+    PathPoint { q: [w, x, y, z], o: Vec3::new(a, b, c) }
 }
 
 #[inline(always)]
-fn store<V: Lanes>(place: &Place<Complex<V>>, block: &mut Block, k: usize) {
+fn store<V: Lanes>(place: &PathPoint<Complex<V>>, block: &mut Block, k: usize) {
     let ([w, x, y, z], [a, b, c]) = (place.q, place.o.array());
     let parts = [w, x, y, z, a, b, c];
     for i in 0..7 {
@@ -533,7 +537,7 @@ mod tests {
     use super::*;
     use crate::common;
     use crate::number::lanes::tests::on_each_width;
-    use crate::numerics::random::Draw;
+    use crate::numerics::random::Random;
 
     #[derive(Clone, Copy)]
     struct Each<'a> {
@@ -552,18 +556,19 @@ mod tests {
         }
     }
 
-    fn complex_places(draw: &mut Draw) -> [Place<C>; WIDTH] {
+    fn complex_places(draw: &mut Random) -> [PathPoint<C>; WIDTH] {
         let mut place =
-            || Place { q: std::array::from_fn(|_| draw.complex()), o: draw.vector(Draw::complex) };
+            || PathPoint { q: std::array::from_fn(|_| draw.complex()), o: draw.vector(Random::complex) };
         std::array::from_fn(|_| place())
     }
 
     #[test]
     fn paths_side_by_side_are_those_alone_bit_by_bit() {
-        let mut draw = Draw(5);
+        let mut draw = Random(5);
         for mech in common::mechanisms() {
-            let [from, to] = [(); 2]
-                .map(|()| std::array::from_fn(|_| Asked { place: draw.complex(), square: draw.complex() }));
+            let [from, to] = [(); 2].map(|()| {
+                std::array::from_fn(|_| LegTarget { place: draw.complex(), square: draw.complex() })
+            });
             let family = Lengths { mech: &mech, from, to };
             let (places, mut block) = (complex_places(&mut draw), ZERO);
             for (k, place) in places.iter().enumerate() {
@@ -584,14 +589,14 @@ mod tests {
             let all: Vec<Evaluated> = all.into_iter().map(|(_, result)| result).collect();
             // Lane 3 is what the equations of that place alone say.
             let at = |a: C, b: C| a + (b - a).scale(t[3]);
-            let asked = std::array::from_fn(|i| Asked {
+            let asked = std::array::from_fn(|i| LegTarget {
                 place: at(from[i].place, to[i].place),
                 square: at(from[i].square, to[i].square),
             });
             let System { residual, matrix } = system(&mech, &places[3].pose(), &asked);
             let step = solve(matrix, residual.map(|f| -f)).x;
             let correction = places[3].along(&mech, &step);
-            let found = Place::get(&all[0].correction, 3);
+            let found = PathPoint::get(&all[0].correction, 3);
             let error = found.q.iter().zip(correction.q).map(|(&a, b)| (a - b).norm()).fold(0.0, f64::max);
             assert!(
                 error < 1e-9 * correction.q.iter().map(|q| q.norm()).fold(1.0, f64::max),
@@ -603,18 +608,18 @@ mod tests {
 
     #[test]
     fn a_quaternion_of_any_size_is_its_rotation() {
-        for place in complex_places(&mut Draw(11)) {
+        for place in complex_places(&mut Random(11)) {
             let pose = place.pose();
-            let again = Place::of(&pose).pose();
+            let again = PathPoint::of(&pose).pose();
             for (a, b) in pose.rotation.0.into_iter().zip(again.rotation.0) {
                 assert!(modulus(a - b) < 1e-12 * (1.0 + modulus(a)));
             }
             let products = pose.rotation.transpose() * pose.rotation;
             assert!(modulus(products.0[1] - Vec3::lift(Vec3::Y)) < 1e-11);
         }
-        // Unit quaternion of a turn by 0.6 about z, twice as large.
+        // Unit quaternion of a rotation by 0.6 about z, twice as large.
         let (s, c) = 0.3_f64.sin_cos();
-        let place = Place { q: [2.0 * c, 0.0, 0.0, 2.0 * s].map(C::lit), o: Vec3::zero() };
+        let place = PathPoint { q: [2.0 * c, 0.0, 0.0, 2.0 * s].map(C::lit), o: Vec3::zero() };
         let turned = Mat3::from_rotation_vector(Vec3::Z * 0.6);
         for (a, b) in place.pose().rotation.0.into_iter().zip(turned.0) {
             assert!(modulus(a - Vec3::lift(b)) < 1e-15);
@@ -624,13 +629,13 @@ mod tests {
     #[test]
     fn the_rate_of_a_place_is_that_of_its_pose() {
         let mech = common::published();
-        let mut draw = Draw(3);
+        let mut draw = Random(3);
         let [place, ..] = complex_places(&mut draw);
         let twist: [C; 6] = std::array::from_fn(|_| draw.complex());
         let rate = place.along(&mech, &twist);
         let h = 1e-6;
         let moved = |h: f64| {
-            let step = Place { q: rate.q.map(|q| q.scale(h)), o: rate.o.scale(h) };
+            let step = PathPoint { q: rate.q.map(|q| q.scale(h)), o: rate.o.scale(h) };
             (place + step).pose()
         };
         let omega = Vec3::new(twist[3], twist[4], twist[5]);

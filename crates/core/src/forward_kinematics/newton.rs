@@ -32,7 +32,7 @@ pub(crate) const PIECE_STEPS: u32 = 12;
 /// Shortest piece of the path: where shorter ones would be needed, its assembly mode ends.
 const SHORTEST_PIECE: f64 = 1e-6;
 
-/// The same after an iteration that has converged.
+/// Largest residual, as a pure number, that still counts as rounding after convergence.
 const MOST_ROUNDING: f64 = 2e-12;
 
 /// Longest Newton step: half a radian, or half a characteristic length.
@@ -48,29 +48,29 @@ const CLEARLY: f64 = 0.25;
 /// of rounding.
 pub const FOLD_PIVOTS: f64 = 1e-5;
 
-/// What is asked of an actuated leg: where its foot is on the rail (zero for a telescopic leg, whose foot is B), and the
-/// square of the distance from there to b \[T25\] \[T69\].
+/// Target of an actuated leg: the position of its foot on the rail (zero for a telescopic leg, whose foot is
+/// B), and the squared distance from there to b \[T25\] \[T69\].
 #[derive(Clone, Copy, Debug)]
-pub struct Asked<T> {
+pub struct LegTarget<T> {
     pub place: T,
     pub square: T,
 }
 
-impl<T: Real> Asked<T> {
+impl<T: Real> LegTarget<T> {
     /// From the one number that varies: the squared length of a telescopic leg, the place of a carriage.
     #[inline(always)]
     pub fn of(leg: &Leg, number: T) -> Self {
         let (place, square) = leg.drive.asked(number);
-        Asked { place, square }
+        LegTarget { place, square }
     }
 
     /// Nothing.
     #[inline(always)]
     pub fn none() -> Self {
-        Asked { place: T::zero(), square: T::zero() }
+        LegTarget { place: T::zero(), square: T::zero() }
     }
 
-    /// r from the foot that is asked for, given that from B.
+    /// r from the given foot, from r of B.
     #[inline(always)]
     pub fn vector(&self, leg: &Leg, r: Vec3<T>) -> Vec3<T> {
         leg.drive.vector(r, self.place)
@@ -78,7 +78,7 @@ impl<T: Real> Asked<T> {
 
     /// The rate of `(ℓ² - r·r)/2` when what is asked for changes; r as above.
     #[inline(always)]
-    pub fn change(leg: &Leg, r: Vec3<T>, rate: &Asked<T>) -> T {
+    pub fn change(leg: &Leg, r: Vec3<T>, rate: &LegTarget<T>) -> T {
         leg.drive.asked_rate(r, rate.place, rate.square)
     }
 }
@@ -92,7 +92,7 @@ pub struct System<T> {
 }
 
 #[inline(always)]
-pub fn system<T: Real>(mech: &Mechanism, pose: &Pose<T>, asked: &[Asked<T>; 6]) -> System<T> {
+pub fn system<T: Real>(mech: &Mechanism, pose: &Pose<T>, asked: &[LegTarget<T>; 6]) -> System<T> {
     let scale = mech.characteristic_length;
     let mut system = System { residual: [T::zero(); 6], matrix: [[T::zero(); 6]; 6] };
     for (k, row) in rows::of(mech).enumerate() {
@@ -125,7 +125,8 @@ impl<T: Real> System<T> {
     }
 }
 
-/// What varies of an actuated leg, in the order of the equations: its squared length, or the place of its carriage.
+/// Varying number of each actuated leg, in the order of the equations: its squared length, or the position of
+/// its carriage.
 #[must_use]
 pub fn numbers(mech: &Mechanism, coordinates: &[f64]) -> [f64; 6] {
     let mut numbers = [0.0; 6];
@@ -135,19 +136,19 @@ pub fn numbers(mech: &Mechanism, coordinates: &[f64]) -> [f64; 6] {
     numbers
 }
 
-/// What is asked of the actuated legs, at most six.
+/// Targets of the actuated legs, at most six.
 #[must_use]
-pub fn asked(mech: &Mechanism, coordinates: &[f64]) -> [Asked<f64>; 6] {
-    let mut asked = [Asked::none(); 6];
+pub fn asked(mech: &Mechanism, coordinates: &[f64]) -> [LegTarget<f64>; 6] {
+    let mut asked = [LegTarget::none(); 6];
     for (asked, of_leg) in asked.iter_mut().zip(asked_of_all(mech, coordinates)) {
         *asked = of_leg;
     }
     asked
 }
 
-/// The same, however many they are.
-pub fn asked_of_all(mech: &Mechanism, coordinates: &[f64]) -> impl Iterator<Item = Asked<f64>> {
-    mech.actuated().zip(coordinates).map(|((_, leg), &q)| Asked::of(leg, leg.drive.number(q)))
+/// Targets of the actuated legs, however many they are.
+pub fn asked_of_all(mech: &Mechanism, coordinates: &[f64]) -> impl Iterator<Item = LegTarget<f64>> {
+    mech.actuated().zip(coordinates).map(|((_, leg), &q)| LegTarget::of(leg, leg.drive.number(q)))
 }
 
 /// Whether actuated legs can have these coordinates: numbers, and lengths none below zero.
@@ -165,7 +166,7 @@ pub fn step_of<T: Real>(mech: &Mechanism, x: [T; 6], share: T) -> Twist<T> {
 
 /// A Newton step from a pose towards `F = to`, and what it is judged by.
 #[derive(Clone, Copy, Debug)]
-struct Newton {
+struct NewtonStep {
     step: [f64; 6],
     size: f64,
     residual: f64,
@@ -175,11 +176,11 @@ struct Newton {
 }
 
 #[inline(always)]
-fn newton(mech: &Mechanism, pose: &Pose<f64>, asked: &[Asked<f64>; 6], to: &[f64; 6]) -> Newton {
+fn newton(mech: &Mechanism, pose: &Pose<f64>, asked: &[LegTarget<f64>; 6], to: &[f64; 6]) -> NewtonStep {
     let System { residual, matrix } = system(mech, pose, asked);
     let residual: [f64; 6] = std::array::from_fn(|i| residual[i] - to[i]);
     let solved = solve(matrix, residual.map(|f| -f));
-    Newton {
+    NewtonStep {
         step: solved.x,
         size: size(&solved.x),
         residual: residual.iter().fold(0.0, |m, f| if f.abs() > m || f.is_nan() { f.abs() } else { m }),
@@ -194,9 +195,9 @@ pub(crate) fn size(x: &[f64; 6]) -> f64 {
     x.iter().map(|e| e * e).sum::<f64>().sqrt()
 }
 
-/// What an iteration came to.
+/// Result of an iteration.
 #[derive(Clone, Copy, Debug)]
-pub struct Found {
+pub struct FoundPose {
     pub pose: Pose<f64>,
     /// The largest error of a length or of a constraint, m.
     pub residual: f64,
@@ -211,20 +212,26 @@ pub struct Found {
 /// Where the mode ends in a singularity on the way, the nearest other solution is sought and reported as one of another
 /// mode.
 #[must_use]
-pub fn forward_kinematics(mech: &Mechanism, lengths: &[f64], guess: &Pose<f64>) -> Found {
+pub fn forward_kinematics(mech: &Mechanism, lengths: &[f64], guess: &Pose<f64>) -> FoundPose {
     let asked = asked(mech, lengths);
     if !are_coordinates(mech, lengths) {
         let nan = f64::NAN;
-        return Found { pose: *guess, residual: nan, iterations: 0, sign: nan, status: Status::InvalidInput };
+        return FoundPose {
+            pose: *guess,
+            residual: nan,
+            iterations: 0,
+            sign: nan,
+            status: Status::InvalidInput,
+        };
     }
     let (continued, steps) = continuation(mech, &asked, guess, SHORTEST_PIECE);
     if let Some(pose) = continued {
         let found = polish(mech, &asked, &pose);
-        return Found { iterations: steps + found.iterations, ..found };
+        return FoundPose { iterations: steps + found.iterations, ..found };
     }
     let other = polish(mech, &asked, guess);
     let status = if other.status == Status::Ok { Status::ModeJump } else { other.status };
-    Found { iterations: steps + other.iterations, status, ..other }
+    FoundPose { iterations: steps + other.iterations, status, ..other }
 }
 
 /// The solution that a motion through the poses `before` and `last` leads to if it goes on evenly, where this is one of
@@ -236,8 +243,8 @@ pub fn passed(
     lengths: &[f64],
     before: &Pose<f64>,
     last: &Pose<f64>,
-    found: &Found,
-) -> Option<Found> {
+    found: &FoundPose,
+) -> Option<FoundPose> {
     let asked = asked(mech, lengths);
     let turn = last.rotation * before.rotation.transpose();
     let ahead = Pose { rotation: turn * last.rotation, o: last.o + last.o - before.o };
@@ -251,7 +258,7 @@ pub fn passed(
         turned.hypot((pose.o - ahead.o).norm() / mech.characteristic_length)
     };
     let nearer = from_ahead(&other.pose) < CLEARLY * from_ahead(&found.pose);
-    (other.status == Status::Ok && nearer).then_some(Found {
+    (other.status == Status::Ok && nearer).then_some(FoundPose {
         iterations: found.iterations + steps + other.iterations,
         status: Status::ModeJump,
         ..other
@@ -264,7 +271,7 @@ pub fn passed(
 #[must_use]
 pub fn continuation(
     mech: &Mechanism,
-    asked: &[Asked<f64>; 6],
+    asked: &[LegTarget<f64>; 6],
     guess: &Pose<f64>,
     shortest: f64,
 ) -> (Option<Pose<f64>>, u32) {
@@ -304,7 +311,7 @@ pub fn continuation(
 
 /// A solution near a pose, whatever its mode, by Newton steps that are shortened until they come nearer \[T26\].
 #[must_use]
-pub fn polish(mech: &Mechanism, asked: &[Asked<f64>; 6], guess: &Pose<f64>) -> Found {
+pub fn polish(mech: &Mechanism, asked: &[LegTarget<f64>; 6], guess: &Pose<f64>) -> FoundPose {
     let mut pose = *guess;
     let mut at = newton(mech, &pose, asked, &[0.0; 6]);
     let (mut share, mut iterations) = (1.0_f64, 0);
@@ -331,13 +338,13 @@ pub fn polish(mech: &Mechanism, asked: &[Asked<f64>; 6], guess: &Pose<f64>) -> F
     } else {
         Status::Singular
     };
-    Found { pose, residual: error(mech, asked, &pose), iterations, sign: at.sign, status }
+    FoundPose { pose, residual: error(mech, asked, &pose), iterations, sign: at.sign, status }
 }
 
 /// The largest error of a length or of a constraint, m; NaN where one is not known.
 #[inline(always)]
 #[must_use]
-pub fn error<V: Ordered>(mech: &Mechanism, asked: &[Asked<V>], pose: &Pose<V>) -> V {
+pub fn error<V: Ordered>(mech: &Mechanism, asked: &[LegTarget<V>], pose: &Pose<V>) -> V {
     let (mut largest, mut unknown, mut count) = (V::zero(), V::zero(), 0);
     for leg in &mech.legs {
         if leg.actuated {

@@ -1,8 +1,9 @@
-//! Forward kinematics of several states side by side, one in each lane: what [`forward`](crate::forward_kinematics::newton) does with one,
-//! where it gets by with one piece of the path. The other states are told apart by masks and left to it.
+//! Forward kinematics of several states side by side, one in each lane:
+//! [`forward`](crate::forward_kinematics::newton) as far as one piece of the path is enough. The other states
+//! are masked out and left to it.
 
 use crate::forward_kinematics::newton::{
-    Asked, CONTRACTION, FOLD_PIVOTS, Found, LONGEST_STEP, PIECE_STEPS, ROUNDING, SMALL_STEP, System,
+    CONTRACTION, FOLD_PIVOTS, FoundPose, LONGEST_STEP, LegTarget, PIECE_STEPS, ROUNDING, SMALL_STEP, System,
     are_coordinates, asked, error, forward_kinematics, polish, step_of, system,
 };
 use crate::model::mechanism::Mechanism;
@@ -20,7 +21,7 @@ pub type Guessed = (Vec<f64>, Pose<f64>);
 /// # Panics
 /// If there are more.
 #[must_use]
-pub fn forward_kinematics_of(mech: &Mechanism, states: &[Guessed]) -> Vec<Found> {
+pub fn forward_kinematics_of(mech: &Mechanism, states: &[Guessed]) -> Vec<FoundPose> {
     let (mut poses, mut to) = ([[0.0; WIDTH]; 12], [[0.0; WIDTH]; 6]);
     for (k, (lengths, guess)) in states.iter().enumerate() {
         put(&mut poses, k, guess);
@@ -91,7 +92,7 @@ pub(crate) struct Piece<V> {
     sign: V,
 }
 
-/// What may have come of a piece, as numbers: it goes on, has arrived, or is left as too long, for it contracts too
+/// State of a piece of the path, as numbers: going on, arrived, or left as too long, because it contracts too
 /// little or changes the sign of the determinant.
 pub(crate) const GOING: f64 = 0.0;
 pub(crate) const ARRIVED: f64 = 1.0;
@@ -118,8 +119,9 @@ impl<V: Lanes> Piece<V> {
         self.sign.store(&mut sign[k..]);
     }
 
-    /// What a Newton step, judged by its size and by the sign of the determinant before it, makes of the piece, and
-    /// where it is to be made; as [`continuation`](crate::forward_kinematics::newton::continuation) does.
+    /// State of the piece after a Newton step, judged by its size and by the sign of the determinant before
+    /// it, and the lanes in which the step is to be made; as
+    /// [`continuation`](crate::forward_kinematics::newton::continuation) does.
     #[inline(always)]
     pub(crate) fn judge(&mut self, size: V, sign: V) -> (V, V::Mask) {
         let (no, yes) = (V::zero(), V::one());
@@ -176,7 +178,7 @@ impl Lane {
         made
     }
 
-    /// What it has come to, by way of one state alone where it has left the others.
+    /// Result of a state, computed alone where it has left the others.
     fn found(
         &self,
         mech: &Mechanism,
@@ -184,15 +186,15 @@ impl Lane {
         guess: &Pose<f64>,
         pose: &Pose<f64>,
         residual: f64,
-    ) -> Found {
+    ) -> FoundPose {
         match self.stage {
             Stage::Solved(status) => {
                 let (iterations, sign) = (self.piece.steps as u32, self.piece.sign);
-                Found { pose: *pose, residual, iterations, sign, status }
+                FoundPose { pose: *pose, residual, iterations, sign, status }
             }
             Stage::Rounding => {
                 let found = polish(mech, &asked(mech, lengths), pose);
-                Found { iterations: self.piece.steps as u32 + found.iterations, ..found }
+                FoundPose { iterations: self.piece.steps as u32 + found.iterations, ..found }
             }
             Stage::Going | Stage::Arrived | Stage::Left => forward_kinematics(mech, lengths, guess),
         }
@@ -200,7 +202,7 @@ impl Lane {
 }
 
 /// A Newton step towards `F = 0`, or one in each lane, and what it is judged by.
-pub(crate) struct Newton<V> {
+pub(crate) struct NewtonStep<V> {
     /// The pose after it.
     pub(crate) next: Pose<V>,
     pub(crate) size: V,
@@ -210,7 +212,12 @@ pub(crate) struct Newton<V> {
 }
 
 #[inline(always)]
-pub(crate) fn newton<V: Lanes>(mech: &Mechanism, pose: &Pose<V>, numbers: &[Row; 6], k: usize) -> Newton<V> {
+pub(crate) fn newton<V: Lanes>(
+    mech: &Mechanism,
+    pose: &Pose<V>,
+    numbers: &[Row; 6],
+    k: usize,
+) -> NewtonStep<V> {
     let System { residual, matrix } = system(mech, pose, &load_asked(mech, numbers, k));
     let (mut rhs, mut largest, mut sum) = (residual, V::zero(), V::zero());
     for f in &mut rhs {
@@ -222,7 +229,7 @@ pub(crate) fn newton<V: Lanes>(mech: &Mechanism, pose: &Pose<V>, numbers: &[Row;
         sum = sum + e * e;
     }
     let next = pose.stepped(&step_of(mech, x, V::one()));
-    Newton { next, size: sum.sqrt(), residual: largest, pivots, sign }
+    NewtonStep { next, size: sum.sqrt(), residual: largest, pivots, sign }
 }
 
 /// What varies of the legs of a state: see [`numbers`](crate::forward_kinematics::newton::numbers).
@@ -233,11 +240,11 @@ pub(crate) fn put_numbers(mech: &Mechanism, rows: &mut [Row], k: usize, coordina
 }
 
 #[inline(always)]
-pub(crate) fn load_asked<V: Lanes>(mech: &Mechanism, numbers: &[Row; 6], k: usize) -> [Asked<V>; 6] {
-    let (mut asked, mut count) = ([Asked::none(); 6], 0);
+pub(crate) fn load_asked<V: Lanes>(mech: &Mechanism, numbers: &[Row; 6], k: usize) -> [LegTarget<V>; 6] {
+    let (mut asked, mut count) = ([LegTarget::none(); 6], 0);
     for leg in &mech.legs {
         if leg.actuated {
-            asked[count] = Asked::of(leg, V::load(&numbers[count][k..]));
+            asked[count] = LegTarget::of(leg, V::load(&numbers[count][k..]));
             count += 1;
         }
     }
@@ -282,12 +289,12 @@ mod tests {
     use super::*;
     use crate::common;
     use crate::kinematics::leg;
-    use crate::numerics::random::Draw;
+    use crate::numerics::random::Random;
     use crate::spatial::{Mat3, Vec3};
 
     #[test]
     fn states_side_by_side_are_those_alone() {
-        let mut draw = Draw(9);
+        let mut draw = Random(9);
         for mech in common::mechanisms().iter().filter(|m| m.actuated().count() == m.dof()) {
             let lengths = |pose: &Pose<f64>| -> Vec<f64> {
                 mech.actuated().map(|(_, leg)| leg::position(leg, pose).coordinate).collect()
@@ -299,7 +306,7 @@ mod tests {
                 .map(|(i, state)| {
                     let off = 10.0_f64.powi(i as i32 % 5 - 5);
                     let turned =
-                        Mat3::from_rotation_vector(draw.vector(Draw::number) * off) * state.pose.rotation;
+                        Mat3::from_rotation_vector(draw.vector(Random::number) * off) * state.pose.rotation;
                     (lengths(&state.pose), Pose { rotation: turned, o: state.pose.o + Vec3::X * off })
                 })
                 .collect();
@@ -308,7 +315,7 @@ mod tests {
             states[6].0[0] = -1.0;
             states[7].1.o.x = f64::NAN;
             let bits =
-                |f: &Found| (f.pose.matrix().map(f64::to_bits), f.residual.to_bits(), f.sign.to_bits());
+                |f: &FoundPose| (f.pose.matrix().map(f64::to_bits), f.residual.to_bits(), f.sign.to_bits());
             for states in states.chunks(WIDTH) {
                 for (found, state) in forward_kinematics_of(mech, states).iter().zip(states) {
                     let [alone] = &forward_kinematics_of(mech, std::slice::from_ref(state))[..] else {

@@ -1,19 +1,19 @@
-//! Equations whose solutions are known, for finding those of a mechanism \[T75\].
+//! Start system of the homotopy, in Study's coordinates \[T75\].
 //!
 //! In Study's coordinates of a pose, `x = (q, p)` with the dual part `p = o q/2Λ`, each equation of
 //! [`forward`](crate::forward_kinematics::newton) is homogeneous: of degree two, or four for a rod whose legs are at an angle. Products of as
 //! many linear forms have their solutions where one form of each vanishes: on lines that meet Study's quadric `q·p = 0`
 //! twice. As such products change into the equations, every regular solution of those is the end of a path.
 
-use crate::forward_kinematics::homotopy::{C, Family, Place};
-use crate::forward_kinematics::newton::{Asked, System, system};
+use crate::forward_kinematics::homotopy::{C, Family, PathPoint};
+use crate::forward_kinematics::newton::{LegTarget, System, system};
 use crate::kinematics::rows::{self, Row};
 use crate::model::mechanism::{Constraint, ConstraintKind, Mechanism};
 use crate::number::complex::Complex;
 use crate::number::lanes::Lanes;
 use crate::number::real::Real;
 use crate::numerics::gauss::solve_all;
-use crate::numerics::random::Draw;
+use crate::numerics::random::Random;
 use crate::spatial::{Mat3, Pose, Vec3};
 
 /// The most forms in a product.
@@ -26,7 +26,7 @@ type Form = [C; 8];
 #[derive(Clone, Debug)]
 pub struct Products<'a> {
     mech: &'a Mechanism,
-    asked: [Asked<C>; 6],
+    asked: [LegTarget<C>; 6],
     /// For each equation, as many as its degree.
     forms: [Vec<Form>; 6],
 }
@@ -34,7 +34,7 @@ pub struct Products<'a> {
 impl<'a> Products<'a> {
     /// Random ones.
     #[must_use]
-    pub fn new(mech: &'a Mechanism, asked: [Asked<C>; 6], draw: &mut Draw) -> Self {
+    pub fn new(mech: &'a Mechanism, asked: [LegTarget<C>; 6], draw: &mut Random) -> Self {
         let degree = |row| match row {
             Row::Leg(_) => 2,
             // An idle spin needs no more than one pose of each orbit, which is a line of Study's coordinates.
@@ -65,7 +65,7 @@ impl<'a> Products<'a> {
     /// The two points of Study's quadric where six forms vanish.
     fn on_line(&self, forms: &[Form; 6]) -> [Pose<C>; 2] {
         // Two points of the line, from two more equations: any that are independent of the others will do.
-        let mut draw = Draw(0x9E37_79B9_7F4A_7C15);
+        let mut draw = Random(0x9E37_79B9_7F4A_7C15);
         let mut rows = [[C::zero(); 8]; 8];
         for (i, row) in rows.iter_mut().enumerate() {
             *row = forms.get(i).copied().unwrap_or_else(|| std::array::from_fn(|_| draw.complex()));
@@ -90,12 +90,16 @@ impl<'a> Products<'a> {
         let (u, v) = (Vec3::new(i, j, k), Vec3::new(b, c, d));
         let square = w * w + u.dot(u);
         let o = (v * w - u * a - v.cross(u)) * (C::lit(2.0 * self.mech.characteristic_length) / square);
-        Place { q: [w, i, j, k], o }.pose()
+        PathPoint { q: [w, i, j, k], o }.pose()
     }
 
     /// The product of the forms of an equation, a pure number, and its derivative by (v/Λ, ω).
     #[inline(always)]
-    fn product<V: Lanes>(&self, i: usize, at: &Coordinates<Complex<V>>) -> (Complex<V>, [Complex<V>; 6]) {
+    fn product<V: Lanes>(
+        &self,
+        i: usize,
+        at: &StudyCoordinates<Complex<V>>,
+    ) -> (Complex<V>, [Complex<V>; 6]) {
         let (mut value, mut row) = (Complex::one(), [Complex::zero(); 6]);
         for (count, form) in self.forms[i].iter().enumerate() {
             let (mut factor, mut along) = (Complex::zero(), [Complex::zero(); 6]);
@@ -127,11 +131,12 @@ impl Family for Products<'_> {
     }
 
     #[inline(always)]
-    fn at<V: Lanes>(&self, place: &Place<Complex<V>>, t: V) -> (System<Complex<V>>, [Complex<V>; 6]) {
-        let asked =
-            self.asked.map(|Asked { place, square }| Asked { place: lift(place), square: lift(square) });
+    fn at<V: Lanes>(&self, place: &PathPoint<Complex<V>>, t: V) -> (System<Complex<V>>, [Complex<V>; 6]) {
+        let asked = self
+            .asked
+            .map(|LegTarget { place, square }| LegTarget { place: lift(place), square: lift(square) });
         let mut system = system(self.mech, &place.pose(), &asked);
-        let coordinates = Coordinates::of(place, self.mech.characteristic_length);
+        let coordinates = StudyCoordinates::of(place, self.mech.characteristic_length);
         let (share, rest) = (Complex::new(t, V::zero()), Complex::new(V::one() - t, V::zero()));
         let mut rates = [Complex::zero(); 6];
         for i in 0..6 {
@@ -151,16 +156,16 @@ impl Family for Products<'_> {
 }
 
 /// Study's coordinates of a pose, and their derivatives by (v/Λ, ω).
-struct Coordinates<T> {
+struct StudyCoordinates<T> {
     x: [T; 8],
     changes: [[T; 8]; 6],
     /// `1/(q·q)`.
     share: T,
 }
 
-impl<T: Real> Coordinates<T> {
+impl<T: Real> StudyCoordinates<T> {
     #[inline(always)]
-    fn of(place: &Place<T>, length: f64) -> Self {
+    fn of(place: &PathPoint<T>, length: f64) -> Self {
         let (q, o) = (place.q, place.o.scale(1.0 / length));
         let join = |q: [T; 4], p: [T; 4]| [q[0], q[1], q[2], q[3], p[0], p[1], p[2], p[3]];
         let mut changes = [[T::zero(); 8]; 6];
@@ -170,7 +175,7 @@ impl<T: Real> Coordinates<T> {
             changes[3 + k] = join(turned, half(o, turned));
         }
         let square = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3];
-        Coordinates { x: join(q, half(o, q)), changes, share: T::one() / square }
+        StudyCoordinates { x: join(q, half(o, q)), changes, share: T::one() / square }
     }
 }
 
@@ -204,20 +209,20 @@ mod tests {
         x.iter().zip(y).fold(C::zero(), |sum, (&a, &b)| sum + a * b)
     }
 
-    fn some_asked(draw: &mut Draw) -> [Asked<C>; 6] {
-        std::array::from_fn(|_| Asked { place: draw.complex(), square: draw.complex() })
+    fn some_asked(draw: &mut Random) -> [LegTarget<C>; 6] {
+        std::array::from_fn(|_| LegTarget { place: draw.complex(), square: draw.complex() })
     }
 
     #[test]
     fn products_vanish_at_their_solutions_and_there_only_once() {
-        let mut draw = Draw(7);
+        let mut draw = Random(7);
         for mech in common::mechanisms() {
             let products = Products::new(&mech, some_asked(&mut draw), &mut draw);
             let solutions = products.solutions();
             let rods = mech.independent.iter().filter(|c| degree(c) == 4).count();
             assert_eq!(solutions.len(), 128 << rods, "{}", mech.name);
             for pose in &solutions {
-                let (System { residual, matrix }, _) = products.at(&Place::of(pose), 0.0);
+                let (System { residual, matrix }, _) = products.at(&PathPoint::of(pose), 0.0);
                 let sizes = matrix.map(|row| row.iter().map(|c| c.norm()).fold(0.0, f64::max));
                 for (f, size) in residual.iter().zip(sizes) {
                     assert!(f.norm() < 1e-10 * size, "{}: {f:?} of {size}", mech.name);
@@ -229,12 +234,13 @@ mod tests {
 
     #[test]
     fn matrices_and_rates_are_derivatives() {
-        let (mut draw, t, h) = (Draw(9), 0.3, 1e-5);
+        let (mut draw, t, h) = (Random(9), 0.3, 1e-5);
         for mech in common::mechanisms().into_iter().chain([common::pentapod(5, "platform", 3)]) {
             let products = Products::new(&mech, some_asked(&mut draw), &mut draw);
-            let place = Place { q: std::array::from_fn(|_| draw.complex()), o: draw.vector(Draw::complex) };
+            let place =
+                PathPoint { q: std::array::from_fn(|_| draw.complex()), o: draw.vector(Random::complex) };
             let (System { matrix, .. }, rates) = products.at(&place, t);
-            let residual = |place: &Place<C>, t: f64| products.at(place, t).0.residual;
+            let residual = |place: &PathPoint<C>, t: f64| products.at(place, t).0.residual;
             let close = |found: C, after: C, before: C, size: f64| {
                 ((after - before).scale(0.5 / h) - found).norm() < 1e-6 * (1.0 + size)
             };
@@ -244,7 +250,7 @@ mod tests {
                 let (after, before) = (moved(h), moved(-h));
                 for i in 0..6 {
                     let size = matrix[i].iter().map(|c| c.norm()).fold(0.0, f64::max);
-                    // No turn changes the residual of an idle spin's equation alone.
+                    // No rotation changes the residual of an idle spin's equation alone.
                     assert!(close(matrix[i][j], after[i], before[i], 10.0 * size), "{}: {i} {j}", mech.name);
                 }
             }
@@ -256,11 +262,11 @@ mod tests {
     }
 
     /// Two points of Study's quadric whose line lies in it.
-    fn line_in_the_quadric(draw: &mut Draw) -> [Form; 2] {
+    fn line_in_the_quadric(draw: &mut Random) -> [Form; 2] {
         let [q, p, turned]: [[C; 4]; 3] = std::array::from_fn(|_| std::array::from_fn(|_| draw.complex()));
         let along = |p: [C; 4], q: [C; 4], share: C| std::array::from_fn::<C, 4, _>(|i| p[i] - q[i] * share);
         let p = along(p, q, dot(&p, &q) / dot(&q, &q));
-        // Square to its own q, and as much along the first one as the other product is.
+        // Perpendicular to its own q, and as much along the first one as the other product is.
         let across = along(turned, q, dot(&turned, &q) / dot(&q, &q));
         let other: [C; 4] = std::array::from_fn(|_| draw.complex());
         let mut second = along(other, across, dot(&other, &across) / dot(&across, &across));
@@ -272,7 +278,7 @@ mod tests {
 
     #[test]
     fn equations_have_their_degree_in_studys_coordinates() {
-        let mut draw = Draw(11);
+        let mut draw = Random(11);
         for mech in common::mechanisms() {
             let asked = some_asked(&mut draw);
             let products = Products::new(&mech, asked, &mut draw);

@@ -1,8 +1,9 @@
-//! Local coordinates of the poses that keep the constraints, and how accelerations read in them \[T53\].
+//! Local coordinates (a chart) of the constraint manifold, by tangent-space parametrisation, and
+//! accelerations in them \[T53\].
 //!
-//! A chart is made at a pose. Its coordinates θ, as many as the mechanism has freedoms, are steps along the twists that
-//! the constraints allow there; across them the pose is put on the constraints by Newton's method. So whatever
-//! integrates θ stays on the constraints, as exactly as numbers can.
+//! A chart is made at a pose. Its coordinates θ, as many as the mechanism has degrees of freedom, are steps
+//! along the twists that the constraints allow there; across them the pose is put on the constraints by
+//! Newton's method. So whatever integrates θ stays on the constraints, as exactly as numbers can.
 
 use nalgebra::DMatrix;
 
@@ -18,7 +19,8 @@ const NEWTON_STEPS: usize = 20;
 /// A step across, relative to the characteristic length, that is rounding.
 const ROUNDING: f64 = 4e-16;
 
-/// The same after an iteration that has converged.
+/// Largest step across, relative to the characteristic length, that still counts as rounding after
+/// convergence.
 const MOST_ROUNDING: f64 = 1e-13;
 
 /// Coordinates about a pose. A vector of the chart is (Δo, Λw), with w the vector of the Cayley map.
@@ -33,7 +35,7 @@ pub struct Chart {
 
 /// A pose of the chart, with what its rates need.
 #[derive(Clone, Copy, Debug)]
-pub struct Place {
+pub struct ChartPoint {
     pub pose: Pose<f64>,
     pub twist: Twist<f64>,
     /// Vector of the Cayley map from the chart's own pose.
@@ -109,7 +111,7 @@ impl Chart {
         solve(m, values)
     }
 
-    /// The twist at the turn w of a rate x' of the chart's vector: ω = (w' + ½ w×w')/(1 + ¼ w·w).
+    /// The twist at the rotation w of a rate x' of the chart's vector: ω = (w' + ½ w×w')/(1 + ¼ w·w).
     fn moved(&self, turn: Vec3<f64>, rate: &[f64; 6]) -> Twist<f64> {
         let Twist { v, omega: w1 } = self.twist_of(rate);
         Twist::new(v, (w1 + turn.cross(w1) * 0.5) * (1.0 / (1.0 + 0.25 * turn.dot(turn))))
@@ -117,7 +119,7 @@ impl Chart {
 
     /// The pose at θ and the twist of the rates θ'; none where the chart ends.
     #[must_use]
-    pub fn place(&self, mech: &Mechanism, theta: &[f64], rates: &[f64]) -> Option<Place> {
+    pub fn place(&self, mech: &Mechanism, theta: &[f64], rates: &[f64]) -> Option<ChartPoint> {
         let along = self.sum(0, theta);
         let mut nu = [0.0; MAX_CONSTRAINTS];
         let count = mech.independent.len();
@@ -152,7 +154,7 @@ impl Chart {
         let back = self.across(mech, &pose, turn, |_, row| -row.power(&forward)).x;
         let aside = self.moved(turn, &self.sum(self.freedoms, &back[..count]));
         let twist = Twist::new(forward.v + aside.v, forward.omega + aside.omega);
-        Some(Place { pose, twist, turn })
+        Some(ChartPoint { pose, twist, turn })
     }
 
     fn stepped(&self, along: &[f64; 6], nu: &[f64]) -> (Pose<f64>, Vec3<f64>) {
@@ -167,9 +169,10 @@ impl Chart {
         self.shares(&Twist::new(twist.v, twist.omega * self.scale).array())
     }
 
-    /// θ'' of an acceleration at a place: with `w' = ω - ½ w×ω + ¼ w (w·ω)`, differentiated once.
+    /// θ'' of an acceleration at a point of the chart: with `w' = ω - ½ w×ω + ¼ w (w·ω)`, differentiated
+    /// once.
     #[must_use]
-    pub fn second_rates(&self, place: &Place, acceleration: &Acceleration<f64>) -> Vec<f64> {
+    pub fn second_rates(&self, place: &ChartPoint, acceleration: &Acceleration<f64>) -> Vec<f64> {
         let (w, omega, eps) = (place.turn, place.twist.omega, acceleration.eps);
         let w1 = omega - w.cross(omega) * 0.5 + w * (0.25 * w.dot(omega));
         let w2 = eps - (w1.cross(omega) + w.cross(eps)) * 0.5

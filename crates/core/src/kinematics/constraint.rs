@@ -22,7 +22,7 @@ pub fn of_leg<S: Scalar>(index: usize, leg: &Leg<S>) -> Vec<Constraint<S>> {
         platform_axis,
         partner: Partner { base_point: none, platform_point: none, turn: Mat3::identity() },
     };
-    // A fixed joint holds δ as well: the leg is square to two axes of the body.
+    // A fixed joint holds δ as well: the leg is perpendicular to two axes of the body.
     let (below, above) = (leg.base.square_to_leg(), leg.platform.square_to_leg());
     let b = below.iter().map(|&a| make(ConstraintKind::B, a, none));
     let c = above.iter().map(|&a| make(ConstraintKind::C, none, a));
@@ -33,8 +33,8 @@ pub fn of_leg<S: Scalar>(index: usize, leg: &Leg<S>) -> Vec<Constraint<S>> {
         (Some(Normal::Along(a)), Some(Normal::Across(w))) => b.chain([d(a, w)]).collect(),
         (Some(Normal::Across(u)), Some(Normal::Along(a))) => c.chain([d(u, a)]).collect(),
         (Some(Normal::Along(n)), Some(Normal::Along(m))) => {
-            // n and m are one line: n is square to the two directions that are square to m. With δ held on both
-            // sides one more relation keeps the platform from turning about n.
+            // n and m are one line: n is perpendicular to the two directions that are perpendicular to m.
+            // With δ held on both sides one more relation keeps the platform from rotating about n.
             let two = |axis: Vec3<S>, direction: Option<Vec3<S>>| {
                 let first = direction.unwrap_or_else(|| axis.perpendicular());
                 [first, axis.cross(first)]
@@ -208,14 +208,14 @@ pub fn hessian<T: Real>(constraint: &Constraint<impl Constant<T>>, pose: &Pose<T
     h
 }
 
-/// What makes a constraint's value a pure number.
+/// Divisor of a constraint's value that makes it a pure number: the scale, or 1 for kind D.
 #[must_use]
 #[inline(always)]
 pub fn unit<S>(c: &Constraint<S>, scale: f64) -> f64 {
     if c.kind == ConstraintKind::D { 1.0 } else { scale }
 }
 
-/// What makes a constraint's value a length.
+/// Factor of a constraint's value that makes it a length: 1, or the scale for kind D.
 #[must_use]
 pub fn length<S>(c: &Constraint<S>, scale: f64) -> f64 {
     if c.kind == ConstraintKind::D { scale } else { 1.0 }
@@ -236,13 +236,14 @@ pub(crate) fn square<T: Real>(row: &Wrench<T>, scale: f64) -> T {
 /// Rows smaller than this vanish: they give no direction and no distance.
 pub(crate) const VANISHING_ROW: f64 = 1e-6;
 
-/// What a row is divided by to make it one of size one; a row that vanishes stays as small as it is.
+/// Divisor that normalises a row; a row that vanishes stays as small as it is.
 #[must_use]
 pub fn row_unit(row: &Wrench<f64>, scale: f64) -> f64 {
     row_size(row, scale).max(VANISHING_ROW)
 }
 
-/// How far the platform must move to satisfy the constraint, to first order, turns counted as arcs at `scale`, m.
+/// How far the platform must move to satisfy the constraint, to first order, rotations counted as arcs at
+/// `scale`, m.
 #[inline(always)]
 #[must_use]
 pub fn distance<V: Ordered>(c: &Constraint, pose: &Pose<V>, scale: f64) -> V {

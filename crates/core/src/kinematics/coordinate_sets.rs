@@ -8,7 +8,7 @@ use crate::kinematics::constraint;
 use crate::model::mechanism::{Constraint, ConstraintKind, MAX_CONSTRAINTS, Mechanism};
 use crate::model::status::Status;
 use crate::number::lanes::{Lanes, Work, any};
-use crate::number::outlined::Called;
+use crate::number::outlined::Outlined;
 use crate::number::real::count;
 use crate::number::real::{Constant, Dual, Jet, Mask, Ordered, Real, Scalar, Trig};
 use crate::numerics::gauss::{solve, solve_all};
@@ -38,7 +38,7 @@ pub enum Set<S = f64> {
     Paper(Plane<S>),
     /// (α, p, h, β, γ): no dependent coordinate, no fold \[T20\].
     Natural(Plane<S>),
-    /// Tip position and tool axis direction, the turn about the tool from the constraint \[T21\].
+    /// Tip position and tool axis direction, the rotation about the tool from the constraint \[T21\].
     Tool,
     /// x, y, z and the angles of Rx(rx) Ry(ry) Rz(rz) \[T22\].
     Pose,
@@ -112,7 +112,7 @@ impl<S: Scalar> Set<S> {
                 Pose { rotation, o: middle - rotation.of(plane.platform_point) }
             }
             Set::Tool => {
-                // [T21] R = (home axis → axis) (turn about the home axis) R_home
+                // [T21] R = (home axis → axis) (rotation about the home axis) R_home
                 let [x, y, z, i, j, k, turn] = *q;
                 let home_axis = mech.home.rotation * mech.tool_axis;
                 let direction = Vec3::new(i, j, k).unit();
@@ -143,7 +143,7 @@ impl Set<Dual<f64>> {
 }
 
 impl Set {
-    /// The same for a mechanism that may vary, but does not.
+    /// Set with dual numbers of zero rate, for a mechanism that may vary.
     pub(crate) fn lifted(&self) -> Set<Dual<f64>> {
         let lifted = |plane: &Plane| Plane {
             base: Mat3::lift(plane.base),
@@ -369,7 +369,7 @@ fn turn_xyz<T: Real>([(s1, c1), (s2, c2), (s3, c3)]: [(T, T); 3]) -> Mat3<T> {
     ])
 }
 
-/// Rodrigues' formula for a turn about a constant unit axis.
+/// Rodrigues' formula for a rotation about a constant unit axis.
 #[inline(always)]
 fn turn_about<T: Trig>(axis: Vec3<f64>, angle: T) -> Mat3<T> {
     let (s, c) = angle.sin_cos();
@@ -384,7 +384,7 @@ fn turn_about<T: Trig>(axis: Vec3<f64>, angle: T) -> Mat3<T> {
 
 /// A state of the platform with all numbers of its coordinate set.
 #[derive(Clone, Copy, Debug)]
-pub struct State {
+pub struct CoordinateState {
     pub coordinates: Values<Jet<f64>>,
     pub platform: Motion<f64>,
     /// Which of several solutions the dependent coordinates are: the sign of sin γ, or of det ∂g/∂y \[T23\].
@@ -404,7 +404,7 @@ pub fn state(
     given: &[bool],
     branch: f64,
     guess: &Pose<f64>,
-) -> State {
+) -> CoordinateState {
     let mut q = *q;
     let finite =
         q.iter().zip(given).all(|(c, g)| !g || (c.x.is_finite() && c.d.is_finite() && c.dd.is_finite()));
@@ -421,10 +421,10 @@ pub fn state(
         }
         (_, status) => (status, f64::NAN),
     };
-    State { coordinates: q, platform: motion(&set.pose(mech, &q)), branch, status }
+    CoordinateState { coordinates: q, platform: motion(&set.pose(mech, &q)), branch, status }
 }
 
-/// What must hold, each with the status where it does not; the first that fails counts.
+/// Conditions, each with the status where it fails; the first that fails counts.
 pub type Conditions<V> = [(Mask<V>, Status); 2];
 
 fn first(conditions: Conditions<f64>) -> Status {
@@ -523,7 +523,7 @@ impl<V: Real> Variation<V> {
     }
 }
 
-/// What varies with a number of the set, or with one of the mechanism.
+/// Variation of the coordinates' map with a number of the set, or with one of the mechanism.
 pub(crate) struct Varying<'a, V> {
     pub mech: &'a Mechanism<Dual<f64>>,
     pub set: &'a Set<Dual<f64>>,
@@ -537,10 +537,10 @@ impl<V: Lanes> Work<V> for Varying<'_, V> {
 
     #[inline(always)]
     fn run(self) -> Variation<V> {
-        let mut q = [Called::zero(); MAX_COORDINATES];
+        let mut q = [Outlined::zero(); MAX_COORDINATES];
         for k in 0..MAX_COORDINATES {
             let (Jet { x, d, dd }, zero) = (self.q[k], V::zero());
-            q[k] = Called(Jet::new(Dual::new(x, zero), Dual::new(d, zero), Dual::new(dd, zero)));
+            q[k] = Outlined(Jet::new(Dual::new(x, zero), Dual::new(d, zero), Dual::new(dd, zero)));
         }
         if let Some(k) = self.number {
             q[k].0.x.d = V::one();
@@ -550,13 +550,13 @@ impl<V: Lanes> Work<V> for Varying<'_, V> {
         let [x, y, z] = pose.rotation.0;
         let vectors = [x, y, z, pose.o];
         for k in 0..4 {
-            let Vec3 { x: Called(x), y: Called(y), z: Called(z) } = vectors[k];
+            let Vec3 { x: Outlined(x), y: Outlined(y), z: Outlined(z) } = vectors[k];
             all.pose[0][k] = Vec3::new(x.x.d, y.x.d, z.x.d);
             all.pose[1][k] = Vec3::new(x.d.d, y.d.d, z.d.d);
             all.pose[2][k] = Vec3::new(x.dd.d, y.dd.d, z.dd.d);
         }
         for k in 0..MAX_CONSTRAINTS {
-            let Called(Jet { x, d, dd }) = values[k];
+            let Outlined(Jet { x, d, dd }) = values[k];
             (all.constraints[0][k], all.constraints[1][k], all.constraints[2][k]) = (x.d, d.d, dd.d);
         }
         all
@@ -566,7 +566,7 @@ impl<V: Lanes> Work<V> for Varying<'_, V> {
 /// How dependent coordinates, with their rates and second rates, follow whatever varies, so that the constraints are kept
 /// \[T56\].
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Following<V: Real> {
+pub(crate) struct ImplicitSensitivity<V: Real> {
     dependent: Dependent,
     /// With each dependent number.
     by: [Variation<V>; MAX_CONSTRAINTS],
@@ -576,7 +576,7 @@ pub(crate) struct Following<V: Real> {
     pub pivots: V::Value,
 }
 
-impl<V: Lanes> Following<V> {
+impl<V: Lanes> ImplicitSensitivity<V> {
     #[inline(always)]
     pub(crate) fn at(
         mech: &Mechanism<Dual<f64>>,
@@ -598,11 +598,11 @@ impl<V: Lanes> Following<V> {
         }
         let solved = solve_all(matrix, unit);
         let pivots = if dependent.count == 0 { V::one() } else { solved.pivots };
-        Following { dependent, by, inverse: solved.x, pivots }
+        ImplicitSensitivity { dependent, by, inverse: solved.x, pivots }
     }
 
-    /// What varies, with what follows: `G_y δy = -δg`, then the same of rates and second rates with what the former do to
-    /// them.
+    /// Variation completed by the dependent coordinates, G_y δy = -δg, then by their rates and second rates
+    /// in the same way.
     #[must_use]
     #[inline(always)]
     pub(crate) fn with(&self, mut all: Variation<V>) -> Variation<V> {
@@ -622,7 +622,8 @@ impl<V: Lanes> Following<V> {
     }
 }
 
-/// Whether there is a shortest turn from the tool axis at home: not to no direction, and not to the opposite one.
+/// Whether there is a shortest rotation from the tool axis at home: not to no direction, and not to the
+/// opposite one.
 #[inline(always)]
 fn tool_turn<V: Ordered>(mech: &Mechanism, q: &Values<Jet<V>>) -> Conditions<V> {
     let axis = Vec3::new(q[3].x, q[4].x, q[5].x);
@@ -843,7 +844,7 @@ pub fn best_given(mech: &Mechanism, set: &Set) -> Vec<bool> {
     best.1
 }
 
-/// What one unit of a dependent coordinate's step is measured by: a length or a radian.
+/// Unit of a dependent coordinate's step: the characteristic length, or a radian.
 #[inline(always)]
 fn reach(set: &Set, index: usize, scale: f64) -> f64 {
     match set {

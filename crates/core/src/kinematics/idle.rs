@@ -1,5 +1,6 @@
-//! Idle freedoms: turns of the platform about a line fixed in it, or in the base, that no leg feels at any pose, as the spin of
-//! a rod that all legs end on \[T70\]. Found from ranks, like all freedoms.
+//! Local degrees of freedom of the platform (idle ones): rotations about a line fixed in it, or in the base,
+//! to which no leg is sensitive at any pose, such as the spin of a rod on which all legs end \[T70\]. Found
+//! from ranks, like all degrees of freedom.
 
 use nalgebra::DMatrix;
 
@@ -34,7 +35,7 @@ pub fn row<T: Real>(idle: &Idle<impl Constant<T>>, pose: &Pose<T>) -> Wrench<T> 
     Wrench::new(Vec3::zero(), axis(idle, pose))
 }
 
-/// The turn by one radian about the line, as a twist of o.
+/// The rotation by one radian about the line, as a twist of o.
 pub fn twist(idle: &Idle, pose: &Pose<f64>) -> Twist<f64> {
     let u = axis(idle, pose);
     let arm = match idle.side {
@@ -64,8 +65,9 @@ fn end<S: Scalar>(leg: &Leg<S>, side: Axes) -> Vec3<S> {
     }
 }
 
-/// The idle freedoms of a mechanism with these independent constraints: those twists that no leg and no constraint feels at
-/// any of the poses, as far as they are turns about lines fixed in the platform, then in the base.
+/// The local degrees of freedom of a mechanism with these independent constraints: those twists that no leg
+/// and no constraint feels at any of the poses, as far as they are rotations about lines fixed in the
+/// platform, then in the base.
 pub(crate) fn find(mech: &Mechanism, independent: &[Constraint], poses: &[Pose<f64>]) -> Vec<Idle> {
     let free: Vec<(Pose<f64>, Vec<Twist<f64>>)> =
         poses.iter().map(|pose| (*pose, unfelt(mech, independent, pose))).collect();
@@ -105,7 +107,7 @@ fn twist_of(scale: f64, x: &[f64; 6]) -> Twist<f64> {
     Twist::new(Vec3::new(a, b, c), Vec3::new(p, q, r) * (1.0 / scale))
 }
 
-/// The turns about lines of a body that are among the twists at every pose.
+/// The rotations about lines of a body that are among the twists at every pose.
 fn fixed(mech: &Mechanism, side: Axes, free: &[(Pose<f64>, Vec<Twist<f64>>)]) -> Vec<Idle> {
     let scale = mech.characteristic_length;
     let nothing = free.is_empty() || free[0].1.is_empty();
@@ -146,8 +148,8 @@ fn seen_from(mech: &Mechanism, side: Axes, pose: &Pose<f64>, twist: &Twist<f64>)
     }
 }
 
-/// A basis of the twists (in pure numbers) with unit angular velocities at right angles, if all of them are turns: without
-/// pitch, and none a translation.
+/// A basis of the twists (in pure numbers) with unit angular velocities at right angles, if all of them are
+/// rotations: without pitch, and none a translation.
 fn turns(twists: &[Twist<f64>]) -> Vec<Twist<f64>> {
     let pitch = |a: &Twist<f64>, b: &Twist<f64>| a.omega.dot(b.v) + b.omega.dot(a.v);
     if twists.iter().any(|a| twists.iter().any(|b| pitch(a, b).abs() > FIXED)) {
@@ -168,7 +170,7 @@ fn turns(twists: &[Twist<f64>]) -> Vec<Twist<f64>> {
         .collect()
 }
 
-/// The line of a turn (pure numbers), told by joints on it where all lie there.
+/// The line of a rotation (pure numbers), through the joints on it where all lie there.
 fn line(mech: &Mechanism, side: Axes, turn: &Twist<f64>) -> Idle {
     let scale = mech.characteristic_length;
     let largest = turn.omega.array().iter().fold(0.0_f64, |m, x| if x.abs() > m.abs() { *x } else { m });
@@ -188,7 +190,8 @@ fn line(mech: &Mechanism, side: Axes, turn: &Twist<f64>) -> Idle {
     varied(&Idle { through, ..idle }, &mech.legs)
 }
 
-/// Whether a turn is no sum of those found, at a pose, and has a row (0, u) of its own beside theirs: there are three at most.
+/// Whether a rotation is no sum of those found, at a pose, and has a row (0, u) of its own beside theirs:
+/// there are three at most.
 fn is_new(mech: &Mechanism, found: &[Idle], idle: &Idle, pose: &Pose<f64>) -> bool {
     let all = || found.iter().chain([idle]);
     let twists = all().map(|idle| {
@@ -212,7 +215,7 @@ mod tests {
         for (body, side) in [("platform", Axes::Platform), ("base", Axes::Base)] {
             for seed in 1..6 {
                 let mech = pentapod(5, body, seed);
-                let [idle] = &mech.idle[..] else { panic!("{} idle freedoms", mech.idle.len()) };
+                let [idle] = &mech.idle[..] else { panic!("{} local degrees of freedom", mech.idle.len()) };
                 assert_eq!((idle.side, mech.mobility.uncontrolled, mech.rows()), (side, 0, 6));
                 for leg in &mech.legs {
                     assert!(idle.axis.cross(end(leg, side) - idle.point).norm() < 1e-12);

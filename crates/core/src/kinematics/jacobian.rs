@@ -1,5 +1,5 @@
-//! The completed Jacobian and Hessian: rows of the actuated legs over those of idle freedoms and of the independent
-//! constraints, and the solves with them.
+//! The completed Jacobian and Hessian: rows of the actuated legs over those of local degrees of freedom and
+//! of the independent constraints, and the solves with them.
 
 use crate::kinematics::quadratic_forms::{Hessian, quadratic};
 use crate::kinematics::redundant_rows::RedundantRows;
@@ -108,7 +108,8 @@ pub struct PlatformMotion<V: Ordered> {
 /// Finds motions of the platform from those of its legs: by Gaussian elimination where J is square, in the sense of least squares
 /// where actuators are redundant \[T73\]. Room for one state after another.
 pub struct MotionSolver<V> {
-    /// Rates or accelerations of the actuated legs, then of idle freedoms: none of these if they do not spin.
+    /// Rates or accelerations of the actuated legs, then of local degrees of freedom: none of these if they
+    /// do not spin.
     pub driven: Vec<V>,
     rest: Vec<V>,
     redundant: Option<RedundantRows<V>>,

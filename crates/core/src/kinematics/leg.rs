@@ -1,6 +1,6 @@
-//! One leg: where it is, how its platform end moves, how it turns, and how its links move.
+//! Kinematics of one leg: position, motion of its platform end, rotation, and motion of its links.
 
-pub use crate::kinematics::leg_state::{End, Frame, PointMotion, Position, State, Turn};
+pub use crate::kinematics::leg_state::{EndMotion, Frame, LegRotation, LegState, PointMotion, Position};
 use crate::kinematics::quadratic_forms::Hessian;
 use crate::model::mechanism::{Direction, Leg, Mechanism, Turning};
 use crate::model::spec::Axes;
@@ -33,13 +33,14 @@ pub fn ahead<S: Constant<T>, T: Real>(mech: &Mechanism<S>, direction: &Direction
     vectors(&mech.legs[direction.leg], pose).1.dot(d)
 }
 
-/// Where the strut begins, base axes.
+/// Foot of the strut, base axes.
 #[inline(always)]
 pub fn foot<T: Real>(leg: &Leg<impl Constant<T>>, p: &Position<T>) -> Vec3<T> {
     leg.drive.foot(Vec3::lift(leg.base.point), p)
 }
 
-/// δ·d, d being the direction of the prismatic joint: one of a telescopic leg, zero where a strut is square to its rail.
+/// δ·d, d being the direction of the prismatic joint: one of a telescopic leg, zero where a strut is
+/// perpendicular to its rail.
 #[inline(always)]
 pub fn transmission<T: Real>(leg: &Leg<impl Constant<T>>, p: &Position<T>) -> T {
     leg.drive.transmission(p)
@@ -58,7 +59,7 @@ pub fn hessian<T: Real>(leg: &Leg<impl Constant<T>>, p: &Position<T>) -> Hessian
     leg.drive.hessian(p)
 }
 
-/// The unit axis behind a leg's frame in base axes, and whether it turns with the platform.
+/// The unit axis behind a leg's frame in base axes, and whether it rotates with the platform.
 #[inline(always)]
 pub(crate) fn turning_axis<T: Real>(turning: Turning<impl Constant<T>>, pose: &Pose<T>) -> (Vec3<T>, bool) {
     match turning {
@@ -108,7 +109,7 @@ pub fn end<T: Real>(
     p: &Position<T>,
     f: &Frame<T>,
     platform: &Motion<T>,
-) -> End<T> {
+) -> EndMotion<T> {
     let Motion { twist, acceleration, .. } = platform;
     let (omega, e) = (twist.omega, p.e);
     // [Eq. 20] [T2] v_b = v + ω×e;  [Eq. 34] a_b = a + ε×e + ω×(ω×e)
@@ -123,9 +124,9 @@ pub fn end<T: Real>(
 pub fn turn<T: Real>(
     leg: &Leg<impl Constant<T>>,
     platform: &Motion<T>,
-    end: &End<T>,
+    end: &EndMotion<T>,
     f: &Frame<T>,
-) -> Turn<T> {
+) -> LegRotation<T> {
     let ([a, b], [a1, b1]) = (end.delta_rate, end.delta_acceleration);
     let (spin, spin_rate) = match leg.turning {
         Turning::Across(Axes::Platform, _) | Turning::Along(Axes::Platform, _) => {
@@ -135,13 +136,13 @@ pub fn turn<T: Real>(
             let (a, b) = (a + omega.z, b - omega.x);
             let a1 = a1 + eps.z - omega.y * (omega.x + b + b);
             let (s, s1) = spin(leg.turning, f.slope, a, b, a1);
-            // The platform's turn about δ, and its rate, come on top.
+            // The platform's rotation about δ, and its rate, come on top.
             (omega.y + s, eps.y + omega.x.mul_add(a, omega.z * b) + s1)
         }
         _ => spin(leg.turning, f.slope, a, b, a1),
     };
     // [T6] ω = δ×δ' + sδ;  ε = δ×δ'' + s'δ + sδ'
-    Turn {
+    LegRotation {
         spin,
         spin_rate,
         omega: Vec3::new(b, spin, -a),
@@ -163,10 +164,10 @@ fn spin<T: Real>(turning: Turning<impl Constant<T>>, slope: T, a: T, b: T, a1: T
 }
 
 /// Where a leg is at a pose, however that moves.
-pub type Place<T> = (Position<T>, Frame<T>);
+pub type LegPlacement<T> = (Position<T>, Frame<T>);
 
 #[inline(always)]
-pub fn place<T: Real>(leg: &Leg<impl Constant<T>>, pose: &Pose<T>) -> Place<T> {
+pub fn place<T: Real>(leg: &Leg<impl Constant<T>>, pose: &Pose<T>) -> LegPlacement<T> {
     let position = position(leg, pose);
     (position, frame(leg, pose, &position))
 }
@@ -175,16 +176,16 @@ pub fn place<T: Real>(leg: &Leg<impl Constant<T>>, pose: &Pose<T>) -> Place<T> {
 #[inline(always)]
 pub fn moving<T: Real>(
     leg: &Leg<impl Constant<T>>,
-    &(position, frame): &Place<T>,
+    &(position, frame): &LegPlacement<T>,
     platform: &Motion<T>,
-) -> State<T> {
+) -> LegState<T> {
     let end = end(leg, &position, &frame, platform);
     let turn = turn(leg, platform, &end, &frame);
-    State { position, end, frame, turn }
+    LegState { position, end, frame, turn }
 }
 
 #[inline(always)]
-pub fn state<T: Real>(leg: &Leg<impl Constant<T>>, platform: &Motion<T>) -> State<T> {
+pub fn state<T: Real>(leg: &Leg<impl Constant<T>>, platform: &Motion<T>) -> LegState<T> {
     moving(leg, &place(leg, &platform.pose), platform)
 }
 
@@ -193,11 +194,11 @@ pub fn state<T: Real>(leg: &Leg<impl Constant<T>>, platform: &Motion<T>) -> Stat
 #[inline(always)]
 pub fn carry<T: Real>(
     leg: &Leg<impl Constant<T>>,
-    state: &State<T>,
+    state: &LegState<T>,
     force: Vec3<T>,
     torque: Vec3<T>,
 ) -> Wrench<T> {
-    let State { position: p, frame: f, .. } = state;
+    let LegState { position: p, frame: f, .. } = state;
     let (inverse, [_, delta, m]) = (T::one() / p.length, f.axes.0);
     // M·ω = (M×δ)·δ' + (M·δ) s, and δ' = (v_b - ℓ'δ)/ℓ
     let along_n = f.slope.mul_add(torque.y, -torque.z).mul_add(inverse, force.x);
@@ -215,30 +216,30 @@ pub fn carry<T: Real>(
 
 /// The piston's mass centre, offset from b [Eq. 38, 39] \[T8\].
 #[inline(always)]
-pub fn piston<T: Real>(leg: &Leg<impl Constant<T>>, state: &State<T>) -> PointMotion<T> {
+pub fn piston<T: Real>(leg: &Leg<impl Constant<T>>, state: &LegState<T>) -> PointMotion<T> {
     state.point_motion(leg.piston.center, state.end.v_b, state.end.a_b)
 }
 
 /// The cylinder's mass centre, offset from B [Eq. 38, 39] \[T8\]; that of a carriage from the strut's foot.
 #[inline(always)]
-pub fn cylinder<T: Real>(leg: &Leg<impl Constant<T>>, state: &State<T>) -> PointMotion<T> {
+pub fn cylinder<T: Real>(leg: &Leg<impl Constant<T>>, state: &LegState<T>) -> PointMotion<T> {
     leg.drive.first_link(leg.cylinder.center, state)
 }
 
-/// How a rod turns about its own line, from the leg that leads it \[T7\].
+/// Rotation of a rod about its own line, from the leg that leads it \[T7\].
 #[derive(Clone, Copy, Debug)]
-pub struct RodTurn<T> {
+pub struct RodRotation<T> {
     pub rate: T,
     pub acceleration: T,
 }
 
 /// [Eq. 25, 36, 37] \[T7\] `ω_L = n·δ'/|L×δ|`, and its rate.
 #[inline(always)]
-pub fn rod_turn<T: Real>(axis: Vec3<T>, leader: &State<T>) -> RodTurn<T> {
-    let State { position: p, end, frame: f, turn } = leader;
+pub fn rod_turn<T: Real>(axis: Vec3<T>, leader: &LegState<T>) -> RodRotation<T> {
+    let LegState { position: p, end, frame: f, turn } = leader;
     let ([a, b], inverse) = (end.delta_rate, T::one() / f.sine);
     let rate = a * inverse;
     // n'·δ' = -s m·δ', and |L×δ|' = n·(L×δ') = (L·δ) m·δ'
     let acceleration = (end.delta_acceleration[0] - b * (turn.spin + rate * axis.dot(p.delta))) * inverse;
-    RodTurn { rate, acceleration }
+    RodRotation { rate, acceleration }
 }

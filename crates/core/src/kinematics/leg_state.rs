@@ -1,4 +1,5 @@
-//! A leg at an instant: its place, its motion, its turning, as what [`leg`](crate::kinematics::leg) and the drives find of them.
+//! A leg at an instant: its place, its motion, its rotation, as what [`leg`](crate::kinematics::leg) and the
+//! drives find of them.
 
 use crate::number::real::Real;
 use crate::spatial::{Mat3, Vec3};
@@ -38,7 +39,7 @@ impl<T: Real> Frame<T> {
 
 /// How the platform end moves, and with it the leg's coordinate and direction \[T2\]-\[T4\] \[T68\].
 #[derive(Clone, Copy, Debug)]
-pub struct End<T> {
+pub struct EndMotion<T> {
     /// Base axes.
     pub v_b: Vec3<T>,
     pub a_b: Vec3<T>,
@@ -51,9 +52,9 @@ pub struct End<T> {
     pub delta_acceleration: [T; 2],
 }
 
-/// How the leg turns \[T6\].
+/// Rotation of the leg: spin, angular velocity and acceleration \[T6\].
 #[derive(Clone, Copy, Debug)]
-pub struct Turn<T> {
+pub struct LegRotation<T> {
     pub spin: T,
     pub spin_rate: T,
     /// Angular velocity and acceleration along n, δ, m.
@@ -63,14 +64,14 @@ pub struct Turn<T> {
 
 /// All of a leg at an instant.
 #[derive(Clone, Copy, Debug)]
-pub struct State<T> {
+pub struct LegState<T> {
     pub position: Position<T>,
-    pub end: End<T>,
+    pub end: EndMotion<T>,
     pub frame: Frame<T>,
-    pub turn: Turn<T>,
+    pub turn: LegRotation<T>,
 }
 
-impl<T: Real> State<T> {
+impl<T: Real> LegState<T> {
     /// Angular velocity, base axes.
     #[inline(always)]
     pub fn omega(&self) -> Vec3<T> {
@@ -83,7 +84,8 @@ impl<T: Real> State<T> {
         self.frame.axes * self.turn.eps
     }
 
-    /// The motion of a point fixed in a link that turns with the leg, from that of the link's reference point.
+    /// The motion of a point fixed in a link that rotates with the leg, from that of the link's reference
+    /// point.
     #[inline(always)]
     pub(crate) fn point_motion(
         &self,
@@ -91,7 +93,7 @@ impl<T: Real> State<T> {
         velocity: Vec3<T>,
         acceleration: Vec3<T>,
     ) -> PointMotion<T> {
-        let (axes, Turn { omega, eps, .. }, center) = (self.frame.axes, self.turn, Vec3::lift(center));
+        let (axes, LegRotation { omega, eps, .. }, center) = (self.frame.axes, self.turn, Vec3::lift(center));
         let spin = omega.cross(center);
         PointMotion {
             offset: axes * center,
@@ -101,7 +103,8 @@ impl<T: Real> State<T> {
     }
 }
 
-/// A point fixed in a link that turns with the leg: offset from the link's reference point, velocity, acceleration.
+/// A point fixed in a link that rotates with the leg: offset from the link's reference point, velocity,
+/// acceleration.
 #[derive(Clone, Copy, Debug)]
 pub struct PointMotion<T> {
     pub offset: Vec3<T>,

@@ -3,7 +3,7 @@
 //! At the base they are those of the leg against the base, at the platform those of the platform against the leg, so
 //! that `ω = ω_leg + φ_1' u + φ_2' n` [Eq. 29].
 
-use crate::kinematics::leg::{self, State};
+use crate::kinematics::leg::{self, LegState};
 use crate::model::joint::Joint;
 use crate::model::limit::Zero;
 use crate::model::mechanism::{Leg, Mechanism};
@@ -36,11 +36,11 @@ pub fn angles<T: Trig>(
     leg: &Leg,
     zero: &Zero,
     platform: &Motion<T>,
-    state: &State<T>,
+    state: &LegState<T>,
 ) -> [JointAngles<T>; 2] {
     let (n, delta, omega) = (state.frame.n(), state.position.delta, state.omega());
     let rotation = &platform.pose.rotation;
-    // Seen from the leg the platform turns the other way.
+    // Seen from the leg the platform rotates the other way.
     let outer = platform.twist.omega - omega;
     [
         JointAngles {
@@ -81,13 +81,13 @@ pub fn angles_at<T: Trig>(
     };
     match side {
         Axes::Base => angles,
-        // Seen from the leg the platform turns the other way.
+        // Seen from the leg the platform rotates the other way.
         Axes::Platform => [-angles[0], -angles[1]],
     }
 }
 
-/// Rates of the angles of a joint whose outer link turns at `omega` against the inner one; `body` are the axes that
-/// the joint's own axis is given in.
+/// Rates of the angles of a joint whose outer link rotates at `omega` against the inner one; `body` are the
+/// axes that the joint's own axis is given in.
 #[inline(always)]
 fn rates<T: Real>(joint: &Joint, body: &Mat3<T>, n: Vec3<T>, omega: Vec3<T>) -> [T; 2] {
     let none = T::lit(f64::NAN);
@@ -106,7 +106,7 @@ pub fn cone_angle<T: Trig>(joint: &Joint, delta: Vec3<T>) -> T {
     axis.cross(delta).norm().atan2(axis.dot(delta))
 }
 
-/// The turn about `axis` that takes `from` to `to`.
+/// The rotation about `axis` that takes `from` to `to`.
 #[inline(always)]
 fn about<T: Trig>(axis: Vec3<f64>, from: Vec3<f64>, to: Vec3<T>) -> T {
     let side = Vec3::lift(axis.cross(from));
@@ -114,8 +114,8 @@ fn about<T: Trig>(axis: Vec3<f64>, from: Vec3<f64>, to: Vec3<T>) -> T {
     to.dot(side).atan2(along)
 }
 
-/// The turn of a leg about its normal since it had the given direction and normal, from where it is to the axis of its
-/// universal joint then and now.
+/// The rotation of a leg about its normal since it had the given direction and normal, from where it is to
+/// the axis of its universal joint then and now.
 #[inline(always)]
 fn swing<T: Trig>(axis: Vec3<f64>, zero: (Vec3<f64>, Vec3<f64>), delta: Vec3<T>, n: Vec3<T>) -> T {
     let (y0, x0) = across(axis, zero.0, zero.1);
@@ -124,7 +124,7 @@ fn swing<T: Trig>(axis: Vec3<f64>, zero: (Vec3<f64>, Vec3<f64>), delta: Vec3<T>,
     (y * x0 - x * y0).atan2(x * x0 + y * y0)
 }
 
-/// The leg's direction across the axis and along it, in the plane square to the normal.
+/// The leg's direction across the axis and along it, in the plane perpendicular to the normal.
 #[inline(always)]
 fn across<T: Real>(axis: Vec3<T>, delta: Vec3<T>, n: Vec3<T>) -> (T, T) {
     (delta.dot(n.cross(axis)), delta.dot(axis))
@@ -137,7 +137,7 @@ pub(crate) fn wrapped<T: Trig>(angle: T) -> T {
     s.atan2(c)
 }
 
-/// The turn of each rod about its line since the home pose; `n` is the normal of the leg that leads it.
+/// The rotation of each rod about its line since the home pose; `n` is the normal of the leg that leads it.
 #[must_use]
 #[inline(always)]
 pub fn rod_angle<T: Trig>(mech: &Mechanism, rod: usize, zero: &Zero, n: Vec3<T>) -> T {

@@ -1,4 +1,4 @@
-//! Quadratic forms of the twist: what second rates have besides the row of the Jacobian.
+//! Quadratic forms Vᵀ h V of the twist: the velocity-dependent part of second rates \[T11\], \[T12\].
 
 use crate::number::real::Real;
 use crate::spatial::{Mat3, Vec3};

@@ -16,8 +16,9 @@ use crate::spatial::{Pose, Twist, Wrench};
 /// constraint by.
 const CONTRADICTION: f64 = 1e-6;
 
-/// The rows A of the n actuated legs and C of constraints and idle freedoms, in pure numbers, factored as `C = L Qᵀ` and
-/// `(A N)ᵀ = L' Q'ᵀ` with the twists N that C allows. Room for one state after another.
+/// The rows A of the n actuated legs and C of constraints and local degrees of freedom, in pure numbers,
+/// factored as `C = L Qᵀ` and `(A N)ᵀ = L' Q'ᵀ` with the twists N that C allows. Room for one state after
+/// another.
 #[derive(Clone, Debug)]
 pub struct RedundantRows<V> {
     /// Λ, m.
@@ -37,7 +38,7 @@ pub struct RedundantRows<V> {
     pub regular: V,
     /// Of the actuated legs.
     pub forces: Vec<V>,
-    /// Of idle freedoms, then of constraints.
+    /// Of local degrees of freedom, then of constraints.
     pub multipliers: Vec<V>,
     /// y: the forces are the preferred ones and the rates that y gives the legs.
     pub motion: Twist<V>,
@@ -136,8 +137,9 @@ impl<V: Lanes> RedundantRows<V> {
         multipliers.copy_from_slice(&self.multipliers);
     }
 
-    /// Where the legs' rates (or accelerations) have a twist, and that in the sense of least squares; `others` are those of
-    /// idle freedoms and constraints, or none. `size` is what the legs may contradict one another by a part of \[T73\].
+    /// Where the legs' rates (or accelerations) have a twist, and that in the sense of least squares;
+    /// `others` are those of local degrees of freedom and constraints, or none. `size` is what the legs may
+    /// contradict one another by a part of \[T73\].
     #[inline(always)]
     pub fn follow(&mut self, legs: &[V], others: &[V], size: V) -> (Twist<V>, V::Mask) {
         // f - A y = -ℓ' with AᵀF = 0: y in the sense of least squares, f what it misses.
@@ -155,7 +157,7 @@ impl<V: Lanes> RedundantRows<V> {
         (self.motion, missed.at_most(most * most))
     }
 
-    /// Orthonormal twists (v, Λω) that the constraints allow, those of idle freedoms among them.
+    /// Orthonormal twists (v, Λω) that the constraints allow, those of local degrees of freedom among them.
     #[inline(always)]
     pub fn put_freedoms(&self, twists: &mut [[V; 6]]) {
         let constraints = 6 - twists.len();

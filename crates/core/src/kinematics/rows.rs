@@ -1,4 +1,4 @@
-//! Rows of the Jacobian in their order: actuated legs, idle freedoms, independent constraints.
+//! Rows of the Jacobian in their order: actuated legs, local degrees of freedom, independent constraints.
 //!
 //! The order is written here alone: [`of`] goes through the rows, [`RowNumbers`] tells where those of each sort are.
 
@@ -15,7 +15,7 @@ use crate::spatial::{Pose, Wrench};
 
 pub type Matrix6<T> = [[T; 6]; 6];
 
-/// What a row of the Jacobian belongs to.
+/// Origin of a row of the Jacobian: a leg, a local degree of freedom, or a constraint.
 #[derive(Clone, Copy, Debug)]
 pub enum Row<'a, S = f64> {
     Leg(&'a Leg<S>),
@@ -57,7 +57,7 @@ impl RowNumbers {
         0..self.actuated
     }
 
-    /// Of idle freedoms.
+    /// Of local degrees of freedom.
     #[must_use]
     #[inline(always)]
     pub fn idle(self) -> Range<usize> {
@@ -94,7 +94,7 @@ impl<S> Row<'_, S> {
         }
     }
 
-    /// Its layer of the Hessian [Eq. 19]; that of an idle freedom is zero.
+    /// Its layer of the Hessian [Eq. 19]; that of a local degree of freedom is zero.
     #[inline(always)]
     pub fn hessian<T: Real>(self, pose: &Pose<T>) -> Hessian<T>
     where
@@ -155,7 +155,7 @@ pub fn pure_jacobian<T: Real>(mech: &Mechanism, pose: &Pose<T>, scale: f64) -> M
     rows
 }
 
-/// An idle freedom's row, counted as a constraint on a turn is: `(0, u)`.
+/// A local degree of freedom's row, counted as a constraint on a rotation is: `(0, u)`.
 #[inline(always)]
 fn idle_row<T: Real>(idle: &Idle, pose: &Pose<T>, scale: f64) -> [T; 6] {
     pure_row(idle::row(idle, pose) * T::lit(scale), scale)

@@ -75,7 +75,7 @@ impl Limit {
         }
     }
 
-    /// The legs that it concerns; those on the rod for the turn of a rod, all for the conditioning.
+    /// The legs that it concerns; those on the rod for the rotation of a rod, all for the conditioning.
     #[must_use]
     pub fn legs(&self, mech: &Mechanism) -> Vec<usize> {
         match &self.measure {
@@ -92,7 +92,7 @@ impl Limit {
         }
     }
 
-    /// What kinematics calls a pose beyond this limit; `Ok` for limits that are none of a joint.
+    /// Status of a pose beyond this limit; `Ok` for limits that are not those of a joint.
     #[must_use]
     pub fn status(&self) -> Status {
         match self.measure {
@@ -105,7 +105,7 @@ impl Limit {
 
     /// The measured quantity of a limit of a joint; NaN for others.
     #[inline(always)]
-    pub fn of_joint<T: Trig>(&self, mech: &Mechanism, pose: &Pose<T>, seen: &mut Seen<T>) -> T {
+    pub fn of_joint<T: Trig>(&self, mech: &Mechanism, pose: &Pose<T>, seen: &mut LegCache<T>) -> T {
         match &self.measure {
             Measure::Length(leg) => seen.length(mech, pose, *leg),
             Measure::Cone(leg, side) => cone(mech, *leg, *side, pose, seen),
@@ -117,7 +117,7 @@ impl Limit {
 
     /// The measured quantity where the pose alone gives it in closed form; NaN for conditioning and force.
     #[inline(always)]
-    fn of_pose<T: Trig>(&self, mech: &Mechanism, pose: &Pose<T>, seen: &mut Seen<T>) -> T {
+    fn of_pose<T: Trig>(&self, mech: &Mechanism, pose: &Pose<T>, seen: &mut LegCache<T>) -> T {
         match &self.measure {
             Measure::Struts([a, b]) => {
                 distance(&a.in_base(mech, pose), &b.in_base(mech, pose)) - T::lit(a.radius + b.radius)
@@ -129,10 +129,10 @@ impl Limit {
         }
     }
 
-    /// The same of one pose: none for conditioning and force. No allocation.
+    /// Quantity of the limit at one pose: none for conditioning and force. No allocation.
     pub fn geometric<T: Trig>(&self, mech: &Mechanism, pose: &Pose<T>) -> Option<T> {
         let closed = !matches!(self.measure, Measure::Conditioning | Measure::Force { .. });
-        closed.then(|| self.of_pose(mech, pose, &mut Seen::default()))
+        closed.then(|| self.of_pose(mech, pose, &mut LegCache::default()))
     }
 
     /// The signed slack at a pose, or at those of all lanes \[T35\]. `forces` are those of the actuators in the
@@ -143,7 +143,7 @@ impl Limit {
         mech: &Mechanism,
         pose: &Pose<V>,
         forces: &[V],
-        seen: &mut Seen<V>,
+        seen: &mut LegCache<V>,
     ) -> V {
         self.bound.margin(match self.measure {
             Measure::Conditioning => smallest(mech, pose),
@@ -153,19 +153,19 @@ impl Limit {
         })
     }
 
-    /// The same of one pose; without forces the margin of a force is NaN.
+    /// Margin of the limit at one pose; without forces the margin of a force is NaN.
     #[must_use]
     pub fn margin(&self, mech: &Mechanism, pose: &Pose<f64>, forces: Option<&[f64]>) -> f64 {
-        self.margin_at(mech, pose, forces.unwrap_or_default(), &mut Seen::default())
+        self.margin_at(mech, pose, forces.unwrap_or_default(), &mut LegCache::default())
     }
 }
 
 /// As many legs as lengths are remembered of.
 const REMEMBERED: usize = 8;
 
-/// What has been seen of the legs at a pose, for all limits that are looked at there.
+/// Leg lengths and directions at a pose, computed once for all limits evaluated there.
 #[derive(Clone, Copy, Debug)]
-pub struct Seen<T> {
+pub struct LegCache<T> {
     /// Of the first legs.
     lengths: [T; REMEMBERED],
     count: usize,
@@ -173,14 +173,14 @@ pub struct Seen<T> {
     last: Option<(usize, Position<T>)>,
 }
 
-impl<T: Real> Default for Seen<T> {
+impl<T: Real> Default for LegCache<T> {
     #[inline(always)]
     fn default() -> Self {
-        Seen { lengths: [T::zero(); REMEMBERED], count: 0, last: None }
+        LegCache { lengths: [T::zero(); REMEMBERED], count: 0, last: None }
     }
 }
 
-impl<T: Real> Seen<T> {
+impl<T: Real> LegCache<T> {
     /// Remembers the next leg's length.
     #[inline(always)]
     pub(crate) fn next(&mut self, p: &Position<T>) {
@@ -216,7 +216,7 @@ fn smallest<V: Lanes>(mech: &Mechanism, pose: &Pose<V>) -> V {
     V::load(&smallest_of_each(mech, &poses, V::WIDTH))
 }
 
-/// The same of the first `count` lanes.
+/// Smallest singular value in each of the first `count` lanes.
 #[inline(never)]
 fn smallest_of_each(mech: &Mechanism, poses: &Poses, count: usize) -> Row {
     let mut found = [0.0; WIDTH];
@@ -234,7 +234,7 @@ impl Strut {
         Segment(self.foot(mech, pose), b).without(self.cut)
     }
 
-    /// Where the strut begins, base axes.
+    /// Foot of the strut, base axes.
     #[inline(always)]
     fn foot<T: Real>(&self, mech: &Mechanism, pose: &Pose<T>) -> Vec3<T> {
         let leg = &mech.legs[self.leg];
@@ -254,7 +254,7 @@ impl Strut {
 }
 
 #[inline(always)]
-fn cone<T: Trig>(mech: &Mechanism, leg: usize, side: Axes, pose: &Pose<T>, seen: &mut Seen<T>) -> T {
+fn cone<T: Trig>(mech: &Mechanism, leg: usize, side: Axes, pose: &Pose<T>, seen: &mut LegCache<T>) -> T {
     let (delta, leg) = (seen.position(mech, pose, leg).delta, &mech.legs[leg]);
     match side {
         Axes::Base => passive_joints::cone_angle(&leg.base, delta),
@@ -262,7 +262,7 @@ fn cone<T: Trig>(mech: &Mechanism, leg: usize, side: Axes, pose: &Pose<T>, seen:
     }
 }
 
-/// Turn of an R joint; of one on a rod, about n.
+/// Rotation of an R joint; of one on a rod, about n.
 #[inline(always)]
 fn angle<T: Trig>(
     mech: &Mechanism,
@@ -270,7 +270,7 @@ fn angle<T: Trig>(
     side: Axes,
     zero: &Zero,
     pose: &Pose<T>,
-    seen: &mut Seen<T>,
+    seen: &mut LegCache<T>,
 ) -> T {
     let (p, leg) = (seen.position(mech, pose, leg), &mech.legs[leg]);
     let n = leg::frame(leg, pose, &p).n();
@@ -279,7 +279,13 @@ fn angle<T: Trig>(
 }
 
 #[inline(always)]
-fn rod_angle<T: Trig>(mech: &Mechanism, rod: usize, zero: &Zero, pose: &Pose<T>, seen: &mut Seen<T>) -> T {
+fn rod_angle<T: Trig>(
+    mech: &Mechanism,
+    rod: usize,
+    zero: &Zero,
+    pose: &Pose<T>,
+    seen: &mut LegCache<T>,
+) -> T {
     let leader = mech.rods[rod].leader;
     let p = seen.position(mech, pose, leader);
     passive_joints::rod_angle(mech, rod, zero, leg::frame(&mech.legs[leader], pose, &p).n())
@@ -294,13 +300,13 @@ fn rod_angle<T: Trig>(mech: &Mechanism, rod: usize, zero: &Zero, pose: &Pose<T>,
 /// If `out` has not one place for each limit.
 pub fn margins(mech: &Mechanism, pose: &Pose<f64>, forces: Option<&[f64]>, out: &mut [f64]) {
     assert_eq!(out.len(), mech.limits.len(), "one margin for each limit");
-    let (forces, mut seen) = (forces.unwrap_or_default(), Seen::default());
+    let (forces, mut seen) = (forces.unwrap_or_default(), LegCache::default());
     for (margin, limit) in out.iter_mut().zip(&mech.limits) {
         *margin = limit.margin_at(mech, pose, forces, &mut seen);
     }
 }
 
-/// Which limit has the least margin relative to its scale, and that margin \[T35\].
+/// The limit with the least relative margin, and that margin \[T35\].
 #[derive(Clone, Copy, Debug)]
 pub struct Binding<V> {
     /// Its number, the first of several; NaN where a margin is NaN, or without limits.

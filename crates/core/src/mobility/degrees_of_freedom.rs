@@ -1,5 +1,5 @@
-//! Mobility from ranks: which constraints are independent, how many loop closures are redundant and which legs they
-//! couple, which freedoms are passive \[T18\].
+//! Mobility from ranks: which constraints are independent, how many loop closures are redundant and which
+//! legs they couple, which degrees of freedom are passive \[T18\].
 //!
 //! Ranks are taken at several generic poses near home, which the machine can have, and the largest counts: at a singular pose
 //! a rank only drops.
@@ -13,7 +13,7 @@ use crate::model::mechanism::{
 };
 use crate::model::mechanism::{Idle, IdleRow};
 use crate::model::spec::Axes;
-use crate::numerics::random::Draw;
+use crate::numerics::random::Random;
 use crate::numerics::svd::Svd;
 use crate::spatial::{Mat3, Pose, Twist, Vec3, Wrench};
 use nalgebra::{DMatrix, DVector};
@@ -30,7 +30,8 @@ const SPREADS: [f64; 4] = [0.03, 0.01, 0.003, 0.001];
 
 const NEWTON_STEPS: usize = 60;
 
-/// Independent constraints, idle freedoms and the mobility of a mechanism whose parts are in place.
+/// Independent constraints, local degrees of freedom and the mobility of a mechanism whose parts are in
+/// place.
 #[must_use]
 pub fn analyse(mech: &Mechanism) -> (Vec<Constraint>, Vec<Idle>, Mobility) {
     let poses = generic_poses(mech);
@@ -84,11 +85,11 @@ fn joint_freedoms(letter: &str) -> usize {
 
 /// Poses near home that the mechanism can have, the same ones every time.
 pub(crate) fn generic_poses(mech: &Mechanism) -> Vec<Pose<f64>> {
-    let mut draw = Draw(0x2545_F491_4F6C_DD1D);
+    let mut draw = Random(0x2545_F491_4F6C_DD1D);
     let size = mech.characteristic_length;
     let mut poses = Vec::new();
     for _ in 0..SAMPLES {
-        let [turn, shift] = [(); 2].map(|()| draw.vector(Draw::number));
+        let [turn, shift] = [(); 2].map(|()| draw.vector(Random::number));
         let near = |spread: f64| {
             let rotation = Mat3::from_rotation_vector(turn * spread) * mech.home.rotation;
             let start = Pose { rotation, o: mech.home.o + shift * (spread * size) };
@@ -185,7 +186,7 @@ fn rank_of(m: &DMatrix<f64>) -> usize {
     Svd::of(m).map_or(0, |svd| svd.rank(RANK_TOLERANCE))
 }
 
-/// Freedoms, idle ones apart, that are left when the actuated legs keep their lengths, at a pose.
+/// Degrees of freedom, local ones apart, that are left when the actuated legs keep their lengths, at a pose.
 fn uncontrolled(mech: &Mechanism, independent: &[Constraint], idle: &[Idle], pose: &Pose<f64>) -> usize {
     let size = mech.characteristic_length;
     let legs = mech.actuated().map(|(_, leg)| leg::row(leg, &leg::position(leg, pose)));
@@ -204,15 +205,15 @@ struct Closure {
     passive_legs: Vec<usize>,
 }
 
-/// Loop closures at a pose: for each leg, the twists of its joints add up to the platform's. Unknown are all joint
-/// rates and the platform's twist; a rod's turning is one unknown for all legs that it carries.
+/// Loop closures at a pose: for each leg, the twists of its joints add up to the platform's. Unknown are all
+/// joint rates and the platform's twist; a rod's rotation is one unknown for all legs that it carries.
 fn closure(mech: &Mechanism, pose: &Pose<f64>) -> Closure {
     let size = mech.characteristic_length;
-    let legs: Vec<Vec<Screw>> = mech.legs.iter().map(|leg| leg_screws(leg, pose)).collect();
+    let legs: Vec<Vec<JointScrew>> = mech.legs.iter().map(|leg| leg_screws(leg, pose)).collect();
     let own: usize = legs.iter().map(Vec::len).sum();
     let columns = mech.rods.len() + own + 6;
     let mut m = DMatrix::zeros(6 * legs.len(), columns);
-    let put = |m: &mut DMatrix<f64>, leg: usize, column: usize, screw: &Screw| {
+    let put = |m: &mut DMatrix<f64>, leg: usize, column: usize, screw: &JointScrew| {
         let (linear, angular) = (screw.linear.map(|c| c / size).array(), screw.angular.array());
         for i in 0..3 {
             m[(6 * leg + i, column)] = linear[i];
@@ -231,7 +232,7 @@ fn closure(mech: &Mechanism, pose: &Pose<f64>) -> Closure {
             passive_legs.push(i);
         }
         if let Some(rod) = mech.legs[i].rod {
-            put(&mut m, i, rod, &Screw::turn(mech.rods[rod].axis, mech.rods[rod].point - pose.o));
+            put(&mut m, i, rod, &JointScrew::turn(mech.rods[rod].axis, mech.rods[rod].point - pose.o));
         }
         for k in 0..6 {
             m[(6 * i + k, own + mech.rods.len() + k)] = -1.0;
@@ -249,20 +250,20 @@ fn closure(mech: &Mechanism, pose: &Pose<f64>) -> Closure {
 }
 
 /// The twist of a unit joint rate, at o.
-struct Screw {
+struct JointScrew {
     linear: Vec3<f64>,
     angular: Vec3<f64>,
 }
 
-impl Screw {
-    /// A turn about a line through o + point.
+impl JointScrew {
+    /// A rotation about a line through o + point.
     fn turn(axis: Vec3<f64>, point: Vec3<f64>) -> Self {
-        Screw { linear: point.cross(axis), angular: axis }
+        JointScrew { linear: point.cross(axis), angular: axis }
     }
 }
 
 /// Joint twists of a leg without its rod: base joint, prismatic, platform joint.
-fn leg_screws(leg: &Leg, pose: &Pose<f64>) -> Vec<Screw> {
+fn leg_screws(leg: &Leg, pose: &Pose<f64>) -> Vec<JointScrew> {
     let p = leg::position(leg, pose);
     let n = leg::frame(leg, pose, &p).n();
     let below = leg::foot(leg, &p) - pose.o;
@@ -270,12 +271,12 @@ fn leg_screws(leg: &Leg, pose: &Pose<f64>) -> Vec<Screw> {
     let (base, platform) = (leg.base.axis.unwrap_or(n), leg.platform.axis.map_or(n, |a| pose.rotation * a));
     let mut base_turns = leg.base.kind.turns(base, n);
     if leg.rod.is_some() {
-        // The rod's own turning is shared with its other legs; what is left is R about n.
+        // The rod's own rotation is shared with its other legs; what is left is R about n.
         base_turns.remove(0);
     }
-    let mut screws: Vec<Screw> = base_turns.into_iter().map(|a| Screw::turn(a, below)).collect();
-    screws.push(Screw { linear, angular });
-    screws.extend(leg.platform.kind.turns(platform, n).into_iter().map(|a| Screw::turn(a, p.e)));
+    let mut screws: Vec<JointScrew> = base_turns.into_iter().map(|a| JointScrew::turn(a, below)).collect();
+    screws.push(JointScrew { linear, angular });
+    screws.extend(leg.platform.kind.turns(platform, n).into_iter().map(|a| JointScrew::turn(a, p.e)));
     screws
 }
 

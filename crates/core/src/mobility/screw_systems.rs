@@ -1,4 +1,5 @@
-//! Screw systems: what a platform is free to do at a pose and what its constraints hold, by axes and pitches \[T66\].
+//! Screw systems at a pose: principal screws of the platform's degrees of freedom, and constraint wrenches,
+//! by axes and pitches \[T66\].
 
 use nalgebra::DMatrix;
 
@@ -9,13 +10,14 @@ use crate::numerics::svd::Svd;
 use crate::spatial::motion::pure_row;
 use crate::spatial::{Pose, Twist, Vec3, Wrench};
 
-/// What is less, in pure numbers, is nothing: a singular value of constraints, a turn, a difference of pitches. Poses may miss
-/// their constraints by as much.
+/// Tolerance, in pure numbers, below which a singular value of constraints, a rotation or a difference of
+/// pitches counts as zero: poses may miss their constraints by as much.
 const NOTHING: f64 = 1e-6;
 
-/// The principal screws of the twists that the constraints leave at a pose, translations first: unit translations, and
-/// turns by one radian about axes at right angles, with the slides that go with them where no translation can take them away.
-/// Among screws of one pitch the axes are those nearest to the base's. None where a leg has no direction.
+/// The principal screws of the twists that the constraints leave at a pose, translations first: unit
+/// translations, and rotations by one radian about axes at right angles, with the slides that go with them
+/// where no translation can take them away. Among screws of one pitch the axes are those nearest to the
+/// base's. None where a leg has no direction.
 #[must_use]
 pub fn freedoms(mech: &Mechanism, pose: &Pose<f64>) -> Option<Vec<(Twist<f64>, Screw)>> {
     let scale = mech.characteristic_length;
@@ -37,7 +39,7 @@ pub fn freedoms(mech: &Mechanism, pose: &Pose<f64>) -> Option<Vec<(Twist<f64>, S
     if free.is_empty() {
         return Some(vec![]);
     }
-    // Those that turn, by a radian about axes at right angles, and those that do not.
+    // Those that rotate, by a radian about axes at right angles, and those that do not.
     let turns = Svd::of(&DMatrix::from_fn(3, free.len(), |i, k| scale * free[k].omega.array()[i]))?;
     let (mut slides, mut screws) = (Vec::new(), Vec::new());
     for k in 0..free.len() {
@@ -63,13 +65,13 @@ fn pitch_form(a: &Twist<f64>, b: &Twist<f64>) -> f64 {
     0.5 * (a.omega.dot(b.v) + b.omega.dot(a.v))
 }
 
-/// The turns with such translations added that as many pitches as can be are zero; what cannot stays.
+/// The rotations with such translations added that as many pitches as can be are zero; what cannot stays.
 fn simplest(turns: &[Twist<f64>], slides: &[Twist<f64>]) -> Option<Vec<Twist<f64>>> {
     let (n, t) = (turns.len(), slides.len());
     if n == 0 || t == 0 {
         return Some(turns.to_vec());
     }
-    // Turn i gets the share (i, s) of slide s: the least shares that leave the least of the form.
+    // Rotation i gets the share (i, s) of slide s: the least shares that leave the least of the form.
     let pairs: Vec<(usize, usize)> = (0..n).flat_map(|i| (i..n).map(move |j| (i, j))).collect();
     let matrix = DMatrix::from_fn(pairs.len(), n * t, |row, column| {
         let ((i, j), (of, slide)) = (pairs[row], (column / t, slides[column % t].v));
@@ -99,7 +101,7 @@ pub fn constraints(mech: &Mechanism, pose: &Pose<f64>) -> Vec<(Wrench<f64>, Scre
     let scale = mech.characteristic_length;
     let of = |c| {
         let Wrench { force, torque } = constraint::row(c, pose);
-        // As of a twist, with the force in place of the turn and the torque in place of the translation.
+        // As of a twist, with the force in place of the rotation and the torque in place of the translation.
         let line = screw(pose.o, &Twist::new(torque, force), scale);
         let couple = !line.pitch.is_finite();
         let size = if couple { torque.norm() } else { force.norm() };
@@ -166,7 +168,7 @@ mod tests {
                         let power = wrench.force.dot(a.v) + wrench.torque.dot(a.omega);
                         assert!(power.abs() <= 1e-9 * size, "{}: {power}", mech.name);
                     }
-                    // Translations come first; a turn is that of its screw.
+                    // Translations come first; a rotation is that of its screw.
                     let slides = i < found.len() - turns;
                     assert_eq!(slides, line.pitch.is_infinite());
                     let along = if slides { a.v } else { a.omega };
@@ -200,8 +202,8 @@ mod tests {
         }
     }
 
-    /// A translation along x makes every parallel of a turn about y a freedom: a screw about it becomes a turn, and axes that
-    /// cross it are brought through one point.
+    /// A translation along x makes every parallel of a rotation about y a degree of freedom: a screw about it
+    /// becomes a rotation, and axes that cross it are brought through one point.
     #[test]
     fn translations_take_away_the_slides_that_they_can() {
         let screw_of = |axis: Vec3<f64>, point: Vec3<f64>, pitch: f64| {
@@ -224,8 +226,8 @@ mod tests {
         assert!((screw(Vec3::zero(), &kept[0], 1.0).pitch - 0.3).abs() <= 1e-14);
     }
 
-    /// Two turns about crossed axes: a cylindroid, its principal screws midway between them (Ball, A Treatise on the Theory of
-    /// Screws, 1900, section 14).
+    /// Two rotations about crossed axes: a cylindroid, its principal screws midway between them (Ball, A
+    /// Treatise on the Theory of Screws, 1900, section 14).
     #[test]
     fn two_crossed_axes_make_a_cylindroid() {
         let (half, apart) = (0.3_f64, 0.2);

@@ -1,5 +1,5 @@
-//! What a pose has of a singularity: determinant, singular values, the kind, and the twist that nothing controls
-//! \[T24\] \[T30\]-\[T33\].
+//! Singularity analysis at a pose: determinant, singular values, kind, uncontrolled twist \[T24\]
+//! \[T30\]-\[T33\].
 
 use nalgebra::{DMatrix, DVector};
 
@@ -17,7 +17,7 @@ use crate::spatial::{Pose, Twist, Vec3};
 /// may miss their constraints by as much of the characteristic length.
 pub const TOLERANCE: f64 = 1e-6;
 
-/// What is singular about a pose, by the conditions of \[T32\]; the first that holds is the kind.
+/// Kind of a singularity, by the conditions of \[T32\]: the first that holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Kind {
@@ -51,20 +51,20 @@ impl Kind {
                 "inverse singularity: a leg has no length, so it has no direction, and its actuator moves nothing"
             }
             Kind::StrutAcrossRail => {
-                "inverse singularity: the strut of a slider is square to its rail, so that its carriage moves the platform no \
-                 longer, and two branches meet"
+                "inverse singularity: the strut of a slider is perpendicular to its rail, so that its \
+                 carriage moves the platform no longer, and two branches meet"
             }
             Kind::ConstraintVanishes => {
                 "constraint singularity: the wrench of a constraint vanishes (c = τ = 0, as where L ∥ l and r ∥ L), and the \
-                 platform gains a freedom that no actuator controls"
+                 platform gains a degree of freedom that no actuator controls"
             }
             Kind::Constraint => {
                 "constraint singularity: the legs' constraint wrenches depend on one another, and the platform gains a \
-                 freedom that no actuator controls"
+                 degree of freedom that no actuator controls"
             }
             Kind::LegFrame => {
-                "passive singularity: a leg lies along the axis of its universal joint or rod, so its turning about itself \
-                 is not determined"
+                "passive singularity: a leg lies along the axis of its universal joint or rod, so its \
+                 rotation about itself is not determined"
             }
             Kind::Actuation => {
                 "direct singularity: with all actuators locked the platform can still move, and forces grow without limit"
@@ -77,8 +77,8 @@ impl Kind {
     }
 }
 
-/// Singular values of the leg Jacobian on the twists that the constraints allow; turns are counted as arcs at the
-/// given length, so that all entries are pure numbers \[T24\].
+/// Singular values of the leg Jacobian on the twists that the constraints allow; rotations are counted as
+/// arcs at the given length, so that all entries are pure numbers \[T24\].
 #[derive(Clone, Copy, Debug)]
 pub struct Conditioning {
     pub sigma_min: f64,
@@ -102,25 +102,26 @@ pub struct Singularity {
     pub kind: Kind,
     /// The leg that the kind speaks of.
     pub leg: Option<usize>,
-    /// How many freedoms the locked actuators leave.
+    /// Number of degrees of freedom that remain with locked actuators.
     pub uncontrolled: usize,
     /// The allowed twist that the legs notice least, `|(v, Λω)| = 1`.
     pub twist: Twist<f64>,
     pub screw: Screw,
 }
 
-/// A twist as a turn about an axis and a slide along it \[T33\].
+/// A twist as a rotation about an axis and a slide along it \[T33\].
 #[derive(Clone, Copy, Debug)]
 pub struct Screw {
     /// Unit direction, base axes.
     pub axis: Vec3<f64>,
-    /// Slide by turn, m/rad; infinite for a pure translation.
+    /// Slide per rotation, m/rad; infinite for a pure translation.
     pub pitch: f64,
     /// The point of the axis that is nearest to o, base axes; o itself for a pure translation.
     pub point: Vec3<f64>,
 }
 
-/// What rounding leaves of a determinant that is zero, relative to the product of its rows' sizes.
+/// Rounding error of a determinant, relative to the product of its rows' sizes, below which it counts as
+/// zero.
 const DETERMINANT_ROUNDING: f64 = 4e-15;
 
 /// det J, zero within rounding, and its exact rate along a twist \[T30\]; det JᵀJ where J has more rows than columns \[T72\].
@@ -192,7 +193,8 @@ fn allowed(mech: &Mechanism, pose: &Pose<f64>, scale: f64, tolerance: f64) -> Al
     }
 }
 
-/// The part of a basis of twists (v, Λω) that is square to the idle ones, which no leg is there to control \[T70\].
+/// The part of a basis of twists (v, Λω) that is perpendicular to the idle ones, which no leg is there to
+/// control \[T70\].
 fn without_idle(mech: &Mechanism, pose: &Pose<f64>, scale: f64, basis: DMatrix<f64>) -> DMatrix<f64> {
     if mech.idle.is_empty() {
         return basis;
@@ -226,7 +228,8 @@ fn leg_values(mech: &Mechanism, pose: &Pose<f64>, scale: f64, allowed: &Allowed)
     }
     let rows: Vec<[f64; 6]> = legs.iter().map(|(leg, p)| pure_row(leg::row(leg, p), scale)).collect();
     let legs = DMatrix::from_fn(rows.len(), 6, |i, j| rows[i][j]);
-    // Where a constraint is lost there are fewer legs than freedoms, so that the last values are zero.
+    // Where a constraint is lost there are fewer legs than degrees of freedom, so that the last values are
+    // zero.
     let Some(svd) = Svd::of(&(legs * allowed.basis.transpose())) else { return nothing };
     let twist = svd.v_t.row(freedoms - 1) * &allowed.basis;
     // One of two opposite twists: the one whose largest entry is positive.
@@ -246,8 +249,8 @@ fn values_of(sigma: &[f64]) -> Conditioning {
     Conditioning { sigma_min, sigma_max, condition: sigma_max / sigma_min }
 }
 
-/// Everything about a pose's nearness to a singularity, turns counted as arcs at `scale`; a measure up to `tolerance`
-/// counts as zero \[T30\]-\[T33\].
+/// Everything about a pose's nearness to a singularity, rotations counted as arcs at `scale`; a measure up to
+/// `tolerance` counts as zero \[T30\]-\[T33\].
 #[must_use]
 pub fn singularity(mech: &Mechanism, pose: &Pose<f64>, scale: f64, tolerance: f64) -> Singularity {
     let positions: Vec<_> = mech.legs.iter().map(|leg| leg::position(leg, pose)).collect();

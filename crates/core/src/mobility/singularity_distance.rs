@@ -1,9 +1,10 @@
-//! How far each coordinate can go, the others kept and the dependent ones following, until det J is zero \[T34\].
+//! Distance from singularity along each coordinate: until det J = 0, the others kept and the dependent ones
+//! following \[T34\].
 
 use std::cell::Cell;
 use std::f64::consts::PI;
 
-use crate::kinematics::coordinate_sets::{self, MAX_COORDINATES, Set, State, Values};
+use crate::kinematics::coordinate_sets::{self, CoordinateState, MAX_COORDINATES, Set, Values};
 use crate::mobility::singularity::{self, Kind, TOLERANCE};
 use crate::model::mechanism::Mechanism;
 use crate::model::status::Status;
@@ -22,13 +23,13 @@ pub struct Nearest {
     pub searched: f64,
 }
 
-/// What is searched: a set of coordinates, those that are given, and how far the lengths among them may go, m.
+/// Search for singularities along coordinates: the set, the given coordinates, and the reach of lengths, m.
 #[derive(Clone, Debug)]
-pub struct Search {
+pub struct SingularitySearch {
     pub set: Set,
     pub given: Vec<bool>,
     pub reach: f64,
-    /// The length that turns are counted with, m.
+    /// The length that rotations are counted with, m.
     pub scale: f64,
 }
 
@@ -49,7 +50,7 @@ const NEAR: f64 = 0.01;
 /// Two poses this near, as pure numbers, are one.
 const SAME_POSE: f64 = 1e-6;
 
-impl Search {
+impl SingularitySearch {
     /// Step and reach of a coordinate.
     fn extent(&self, index: usize) -> (f64, f64) {
         match self.set.names()[index] {
@@ -64,7 +65,11 @@ impl Search {
 ///
 /// # Errors
 /// The status of a pose that the coordinates cannot describe.
-pub fn start(mech: &Mechanism, search: &Search, pose: &Pose<f64>) -> Result<(Values<f64>, f64), Status> {
+pub fn start(
+    mech: &Mechanism,
+    search: &SingularitySearch,
+    pose: &Pose<f64>,
+) -> Result<(Values<f64>, f64), Status> {
     let q = search.set.values(mech, pose);
     let mut status = Status::NotConverged;
     for branch in [1.0, -1.0] {
@@ -79,7 +84,7 @@ pub fn start(mech: &Mechanism, search: &Search, pose: &Pose<f64>) -> Result<(Val
 }
 
 /// Given numbers, as many as any set has: those beyond this set's own are not looked at.
-fn mask(search: &Search) -> Vec<bool> {
+fn mask(search: &SingularitySearch) -> Vec<bool> {
     (0..MAX_COORDINATES).map(|i| search.given.get(i).copied().unwrap_or(true)).collect()
 }
 
@@ -89,9 +94,9 @@ fn same(a: &Pose<f64>, b: &Pose<f64>, scale: f64) -> bool {
 }
 
 /// The poses that one coordinate passes, by the way from its value at the start; the others are kept.
-struct Path<'a> {
+struct CoordinatePath<'a> {
     mech: &'a Mechanism,
-    search: &'a Search,
+    search: &'a SingularitySearch,
     given: Vec<bool>,
     start: Values<f64>,
     branch: f64,
@@ -101,13 +106,13 @@ struct Path<'a> {
     last: Cell<Pose<f64>>,
 }
 
-impl Path<'_> {
+impl CoordinatePath<'_> {
     /// The coordinate's value after a way.
     fn place(&self, way: f64) -> f64 {
         self.start[self.index] + self.direction * way
     }
 
-    fn state(&self, way: f64) -> State {
+    fn state(&self, way: f64) -> CoordinateState {
         let mut q = self.start.map(Jet::lit);
         q[self.index] = Jet::new(self.place(way), self.direction, 0.0);
         coordinate_sets::state(self.mech, &self.search.set, &q, &self.given, self.branch, &self.last.get())
@@ -120,7 +125,7 @@ impl Path<'_> {
 
     /// det J and its rate, as long as dependent coordinates are on the branch `side`: beyond a fold is another path.
     fn node(&self, way: f64, side: f64) -> Option<Node> {
-        let State { platform, branch, status, .. } = self.state(way);
+        let CoordinateState { platform, branch, status, .. } = self.state(way);
         if status != Status::Ok || branch != side {
             return None;
         }
@@ -129,7 +134,7 @@ impl Path<'_> {
         det.x.is_finite().then_some(Node { t: way, f: det.x, d: det.d })
     }
 
-    /// What is singular about a pose, if anything is.
+    /// Kind of singularity of a pose, if it is singular.
     fn kind(&self, pose: &Pose<f64>, tolerance: f64) -> Option<Kind> {
         let found = singularity::singularity(self.mech, pose, self.search.scale, tolerance);
         Some(found.kind).filter(|&kind| kind != Kind::None)
@@ -151,14 +156,14 @@ impl Path<'_> {
 #[must_use]
 pub fn along(
     mech: &Mechanism,
-    search: &Search,
+    search: &SingularitySearch,
     pose: &Pose<f64>,
     (start, branch): (&Values<f64>, f64),
     index: usize,
     direction: f64,
 ) -> Nearest {
     let (given, last) = (mask(search), Cell::new(*pose));
-    let path = Path { mech, search, given, start: *start, branch, index, direction, last };
+    let path = CoordinatePath { mech, search, given, start: *start, branch, index, direction, last };
     let side = path.state(0.0).branch;
     let touches = |way: f64| {
         path.pose(way).is_some_and(|pose| singularity::smallest(mech, &pose, search.scale) <= TOLERANCE)

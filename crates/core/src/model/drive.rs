@@ -5,7 +5,7 @@
 use crate::number::real::Real;
 use crate::spatial::Vec3;
 
-/// What a leg's actuated (or passive) joint between two links moves \[T67\].
+/// Kind of a leg's prismatic joint, actuated or passive \[T67\].
 #[derive(Clone, Copy, Debug)]
 pub enum Drive<S = f64> {
     Telescope(Telescope),
@@ -41,7 +41,8 @@ pub struct DriveKind {
     pub active: usize,
     /// The least coordinate that there can be.
     pub least: f64,
-    /// Which of the ten numbers of the first link's body have an effect; none where it turns with the leg and all may have.
+    /// Which of the ten numbers of the first link's body have an effect; none where it rotates with the leg
+    /// and all may have.
     pub own_numbers: Option<&'static [&'static [usize]]>,
     /// Parts of its geometry, in order.
     pub parts: &'static [Part],
@@ -53,7 +54,7 @@ pub enum Vector {
     Point,
     /// A unit vector: a change along it is none.
     Axis,
-    /// The same, of an F joint.
+    /// The unit normal of an F joint: a change along it is none.
     Normal,
     /// One number.
     Length,
@@ -84,7 +85,7 @@ pub const SLIDER: DriveKind = DriveKind {
     force_unit: "N",
     active: 1,
     least: f64::MIN,
-    // It does not turn and is held by a rail: its mass.
+    // It does not rotate and is held by a rail: its mass.
     own_numbers: Some(&[&[0]]),
     parts: &[Part { name: "rail", vector: Vector::Axis }, Part { name: "strut", vector: Vector::Length }],
 };
@@ -98,9 +99,9 @@ impl<S> Drive<S> {
         }
     }
 
-    /// Whether it moves the strut's foot, not its far end. Its joint then lies below the base joint, between the base and the
-    /// first link, which does not turn with the leg; the strut keeps its length, and there may be no place or two from which
-    /// it reaches b.
+    /// Whether it moves the strut's foot, not its far end. Its joint then lies below the base joint, between
+    /// the base and the first link, which does not rotate with the leg; the strut keeps its length, and there
+    /// may be no place or two from which it reaches b.
     #[must_use]
     #[inline(always)]
     pub const fn moves_foot(&self) -> bool {
@@ -110,7 +111,7 @@ impl<S> Drive<S> {
         }
     }
 
-    /// What the base joint and the drive's joint lie between, of what the leg stands on and its two links.
+    /// Links joined by the base joint, and by the drive's joint: of the ground and the leg's two links.
     #[must_use]
     pub fn between<L: Clone>(&self, [ground, first, second]: [L; 3]) -> [[L; 2]; 2] {
         let (lower, upper) = ([ground, first.clone()], [first, second]);

@@ -7,10 +7,10 @@ use crate::spatial::Vec3;
 
 /// The kinds, by their letters:
 ///
-/// | | freedoms | axis, in its body | what it does to the leg's normal n \[T5\] |
+/// | | degrees of freedom | axis, in its body | what it does to the leg's normal n \[T5\] |
 /// |---|---|---|---|
 /// | S | 3 | none | leaves it free |
-/// | U | 2, one on a rod | that fixed to the body | holds it square to the axis |
+/// | U | 2, one on a rod | that fixed to the body | holds it perpendicular to the axis |
 /// | R | 1 | its own | holds it along the axis |
 /// | F | 0 | the leg's direction δ, and its normal n | holds it along the normal, and δ with it |
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
@@ -25,10 +25,10 @@ pub enum JointKind {
     Fixed,
 }
 
-/// What a joint does to the normal n of its leg: with an axis of its body, if that is asked for.
+/// Effect of a joint on the normal n of its leg, with an axis of its body if wanted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Normal<A = ()> {
-    /// Square to the axis.
+    /// Perpendicular to the axis.
     Across(A),
     /// Along the axis.
     Along(A),
@@ -74,7 +74,7 @@ impl JointKind {
         self.freedoms() == 0
     }
 
-    /// What it does to the leg's normal; none for nothing.
+    /// Effect on the leg's normal, if any.
     #[must_use]
     #[inline(always)]
     pub const fn normal(self) -> Option<Normal> {
@@ -96,7 +96,7 @@ impl JointKind {
         self.is_fixed()
     }
 
-    /// Whether its turn may have a range.
+    /// Whether its rotation may have a range.
     #[must_use]
     pub fn has_range(self) -> bool {
         self == JointKind::Revolute
@@ -113,7 +113,7 @@ impl JointKind {
         }
     }
 
-    /// Directions that it turns about, given its axis and the leg's normal.
+    /// Directions that it rotates about, given its axis and the leg's normal.
     #[must_use]
     pub fn turns(self, axis: Vec3<f64>, n: Vec3<f64>) -> Vec<Vec3<f64>> {
         match self {
@@ -124,8 +124,8 @@ impl JointKind {
         }
     }
 
-    /// What is wrong with its axis beside a leg of the direction δ, to sines below `tolerance`: with the axis along it by the
-    /// cosine `along` and across it by the sine `across`.
+    /// Fault of its axis against a leg of direction δ, to sines below `tolerance`, from the cosine `along`
+    /// and the sine `across` of their angle.
     #[must_use]
     pub fn misplaced(self, along: f64, across: f64, tolerance: f64) -> Option<&'static str> {
         let (wrong, need) = match self {
@@ -133,7 +133,9 @@ impl JointKind {
             JointKind::Universal => {
                 (across <= tolerance, "the axis of a U joint (or its rod) must not lie along it")
             }
-            JointKind::Revolute => (along.abs() > tolerance, "the axis of an R joint must be square to it"),
+            JointKind::Revolute => {
+                (along.abs() > tolerance, "the axis of an R joint must be perpendicular to it")
+            }
             JointKind::Fixed => {
                 (across > tolerance || along < 0.0, "the axis of an F joint must point along it, from B to b")
             }
@@ -162,7 +164,7 @@ impl<S: Copy> Joint<S> {
         if self.kind.is_fixed() { self.axis } else { None }
     }
 
-    /// What it does to the leg's normal, with the axis for it.
+    /// Effect on the leg's normal, with the axis for it.
     #[inline(always)]
     pub fn normal(&self) -> Option<Normal<Vec3<S>>> {
         let axis = if let JointKind::Fixed = self.kind { self.normal } else { self.axis };
@@ -174,7 +176,7 @@ impl<S: Copy> Joint<S> {
 }
 
 impl<S: Real> Joint<S> {
-    /// Axes of the body that the leg is square to: R, its axis; F, which holds δ, two of them.
+    /// Axes of the body that the leg is perpendicular to: R, its axis; F, which holds δ, two of them.
     pub fn square_to_leg(&self) -> Vec<Vec3<S>> {
         match (self.kind, self.axis, self.normal) {
             (JointKind::Revolute, Some(a), _) => vec![a],

@@ -12,20 +12,21 @@ pub struct Limit {
     pub name: String,
     pub measure: Measure,
     pub bound: Bound,
-    /// What margins are divided by to compare them, in their unit: the width of what is allowed, or of the machine.
+    /// Scale of the relative margin, in the unit of the margin: the width of the allowed range, or the size
+    /// of the machine.
     pub scale: f64,
 }
 
-/// What a limit measures. Legs count from 0.
+/// Quantity bounded by a limit. Legs count from 0.
 #[derive(Clone, Debug)]
 pub enum Measure {
     /// Length of a leg, or place of its carriage, m.
     Length(usize),
     /// Angle between a leg and the cone axis of its joint, rad.
     Cone(usize, Axes),
-    /// Turn of a leg's R joint since home, rad.
+    /// Rotation of a leg's R joint since home, rad.
     Angle(usize, Axes, Zero),
-    /// Turn of a rod since home, rad.
+    /// Rotation of a rod since home, rad.
     RodAngle(usize, Zero),
     /// Distance between the surfaces of two struts, m.
     Struts([Strut; 2]),

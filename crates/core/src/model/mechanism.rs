@@ -28,7 +28,8 @@ impl Body {
     };
 }
 
-/// What gives the leg's frame (n, δ, n×δ) its direction n, and so its spin about δ \[T5\].
+/// Joint axis that determines the normal n of the leg's frame (n, δ, n×δ), and with it the spin about δ
+/// \[T5\].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Turning<S = f64> {
     /// A universal joint: n is along u×δ.
@@ -78,7 +79,7 @@ pub struct Leg<S = f64> {
     pub platform: Joint<S>,
     /// The rod that carries the base joint. Seen from the leg the joint is then U with the rod's line as its axis.
     pub rod: Option<usize>,
-    /// Centre measured from B, in leg axes. Of a slider: the carriage, in base axes, which does not turn.
+    /// Centre measured from B, in leg axes. Of a slider: the carriage, in base axes, which does not rotate.
     pub cylinder: Body,
     /// Centre measured from b, in leg axes. Of a slider: the strut.
     pub piston: Body,
@@ -115,7 +116,7 @@ pub struct Rod<S = f64> {
     /// Unit vector L.
     pub axis: Vec3<S>,
     pub body: Body,
-    /// The leg that the rod's turning is computed from, the first that it carries.
+    /// The leg that the rod's rotation is computed from, the first that it carries.
     pub leader: usize,
 }
 
@@ -129,9 +130,9 @@ pub struct Load {
 pub enum ConstraintKind {
     /// U below, U above: leg and both axes lie in one plane, `(l × r)·L = 0` \[Eq. 4\].
     A,
-    /// R or F below: the leg is square to an axis of the base, `r·a_B = 0`.
+    /// R or F below: the leg is perpendicular to an axis of the base, `r·a_B = 0`.
     B,
-    /// R or F above: the leg is square to an axis of the platform, `r·a_P = 0`.
+    /// R or F above: the leg is perpendicular to an axis of the platform, `r·a_P = 0`.
     C,
     /// R or F against U, R or F: two axes are square, `a_B·a_P = 0`.
     D,
@@ -158,11 +159,11 @@ pub struct Constraint<S = f64> {
 pub struct Partner<S = f64> {
     pub base_point: Vec3<S>,
     pub platform_point: Vec3<S>,
-    /// Q, the constant turn about L that takes the plane of the first leg into that of the second.
+    /// Q, the constant rotation about L that takes the plane of the first leg into that of the second.
     pub turn: Mat3<S>,
 }
 
-/// A turn about a line that no leg feels.
+/// A local degree of freedom of the platform: a rotation about a line to which no leg is sensitive.
 #[derive(Clone, Copy, Debug)]
 pub struct Idle<S = f64> {
     /// The body that the line is fixed in.
@@ -175,7 +176,7 @@ pub struct Idle<S = f64> {
     pub through: Option<[usize; 2]>,
 }
 
-/// An idle freedom as it is told: the line in the axes of its body, m.
+/// A local degree of freedom as data: its line in the axes of its body, m.
 #[derive(Clone, Debug, Serialize)]
 pub struct IdleRow {
     pub body: &'static str,
@@ -220,7 +221,7 @@ pub struct Mobility {
     pub dof: usize,
     pub links: usize,
     pub joints: usize,
-    /// Sum of the joints' freedoms.
+    /// Sum of the joints' degrees of freedom.
     pub joint_freedoms: usize,
     pub loops: usize,
     /// Rank of the loop closures, at most six for each loop.
@@ -229,14 +230,15 @@ pub struct Mobility {
     pub redundant: usize,
     /// Legs (from 0) whose constraints the redundant ones couple.
     pub redundant_legs: Vec<usize>,
-    /// Freedoms that leave the platform where it is.
+    /// Degrees of freedom that leave the platform where it is.
     pub passive: usize,
     /// Legs (from 0) that have them.
     pub passive_legs: Vec<usize>,
-    /// Freedoms, idle ones apart, that remain at generic poses when all actuators are locked: zero unless the design itself
-    /// is singular.
+    /// Degrees of freedom, local ones apart, that remain at generic poses when all actuators are locked: zero
+    /// unless the design itself is singular.
     pub uncontrolled: usize,
-    /// Freedoms that no leg feels by design: turns about lines of the platform or of the base \[T70\].
+    /// Degrees of freedom that no leg feels by design: rotations about lines of the platform or of the base
+    /// \[T70\].
     pub idle: Vec<IdleRow>,
     /// Scalar constraints of the legs: leg (from 0) and kind, and whether it is one of the independent ones.
     pub constraints: Vec<ConstraintRow>,
@@ -255,7 +257,7 @@ pub struct Mechanism<S = f64> {
     pub name: String,
     pub legs: Vec<Leg<S>>,
     pub rods: Vec<Rod<S>>,
-    /// Which way fixed joints hold their legs.
+    /// Directions in which fixed joints hold their legs.
     pub directions: Vec<Direction<S>>,
     pub platform: Body,
     pub gravity: Vec3<f64>,
@@ -270,16 +272,17 @@ pub struct Mechanism<S = f64> {
     pub constraints: Vec<Constraint<S>>,
     /// Those of them that are independent at generic poses, in the order of the legs.
     pub independent: Vec<Constraint<S>>,
-    /// Freedoms that no leg feels, each with a row of its own in the Jacobian, between those of legs and constraints \[T70\].
+    /// Degrees of freedom that no leg feels, each with a row of its own in the Jacobian, between those of
+    /// legs and constraints \[T70\].
     pub idle: Vec<Idle<S>>,
     /// Root mean square distance of the platform joints from o: what lengths are scaled by, m.
     pub characteristic_length: f64,
     pub mobility: Mobility,
-    /// What the file allows: joints first, then clearances, conditioning, forces \[T35\].
+    /// Limits of the mechanism file: joints first, then clearances, conditioning, forces \[T35\].
     pub limits: Vec<Limit>,
 }
 
-/// The largest number of independent constraints: one freedom at least must remain.
+/// The largest number of independent constraints: one degree of freedom at least must remain.
 pub const MAX_CONSTRAINTS: usize = 5;
 
 impl<S> Mechanism<S> {
@@ -288,7 +291,8 @@ impl<S> Mechanism<S> {
         6 - self.independent.len()
     }
 
-    /// Rows of the Jacobian: actuated legs, idle freedoms, independent constraints. Six, or more where actuators are redundant.
+    /// Rows of the Jacobian: actuated legs, local degrees of freedom, independent constraints. Six, or more
+    /// where actuators are redundant.
     #[must_use]
     pub fn rows(&self) -> usize {
         self.actuated().count() + self.idle.len() + self.independent.len()

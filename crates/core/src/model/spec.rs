@@ -11,7 +11,8 @@ use crate::model::drive::{self, DriveKind};
 use crate::model::joint::JointKind;
 use crate::spatial::{Mat3, Vec3};
 
-/// What is wrong, and where: `legs.3.stroke` counts from 1, as the file does.
+/// A fault of a description: its place, such as `legs.3.stroke` (counted from 1, as in the file), and a
+/// message.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Fault {
     pub place: String,
@@ -41,7 +42,7 @@ pub struct JointSpec {
     pub normal: Option<Vec3<f64>>,
     pub rod: Option<usize>,
     pub cone: Option<ConeSpec>,
-    /// R: least and greatest turn since home, rad.
+    /// R: least and greatest rotation since home, rad.
     pub range: Option<[f64; 2]>,
 }
 
@@ -67,7 +68,7 @@ pub struct SliderSpec {
     pub carriage: Option<CarriageSpec>,
 }
 
-/// What slides on a rail and does not turn: its mass, and the mass centre from the base joint, base axes.
+/// Carriage of a slider, which does not rotate: its mass, and the mass centre from the base joint, base axes.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CarriageSpec {
@@ -96,7 +97,7 @@ pub struct LegSpec {
 }
 
 impl LegSpec {
-    /// What it is driven by.
+    /// Kind of its drive.
     fn drive(&self) -> &'static DriveKind {
         match self.slider {
             None => &drive::TELESCOPE,
@@ -104,7 +105,7 @@ impl LegSpec {
         }
     }
 
-    /// The bodies that turn with the leg, and their keys in the file.
+    /// The bodies that rotate with the leg, and their keys in the file.
     fn turning_bodies(&self) -> Vec<(&'static str, Option<&BodySpec>)> {
         let DriveKind { links: [first, second], own_numbers, .. } = self.drive();
         let turns = own_numbers.is_none().then_some((*first, self.cylinder.as_ref()));
@@ -119,7 +120,7 @@ pub struct RodSpec {
     pub point: Vec3<f64>,
     pub axis: Vec3<f64>,
     pub body: Option<BodySpec>,
-    /// Least and greatest turn about its line since home, rad.
+    /// Least and greatest rotation about its line since home, rad.
     pub range: Option<[f64; 2]>,
 }
 
@@ -161,7 +162,7 @@ pub struct LimitsSpec {
     pub sigma_min: Option<f64>,
     /// Least distance between the surfaces of struts, and between strut and platform, m.
     pub clearance: Option<f64>,
-    /// How much of a strut at its joint does not count for clearances, m.
+    /// Length of strut at its joint that does not count for clearances, m.
     pub joint_reach: Option<f64>,
 }
 
@@ -373,7 +374,7 @@ impl Faults {
         }
     }
 
-    /// The range of an angle. The circle has no ends: a turn of 350 degrees is one of -10.
+    /// The range of an angle. The circle has no ends: a rotation of 350 degrees is one of -10.
     fn range(&mut self, place: &str, range: Option<[f64; 2]>) {
         if let Some([min, max]) = range
             && !(min < max && max - min <= TAU)
@@ -450,7 +451,7 @@ impl Faults {
         if let (true, Some(axis), Some(normal)) = (joint.joint.has_normal(), joint.axis, joint.normal)
             && axis.dot(normal).abs() > ANGLE_TOLERANCE * axis.norm() * normal.norm()
         {
-            self.add(format!("{place}.normal"), "must be square to the axis");
+            self.add(format!("{place}.normal"), "must be perpendicular to the axis");
         }
         if let Some(axis) = joint.cone.as_ref().and_then(|cone| cone.axis) {
             self.axis(&format!("{place}.cone.axis"), axis);

@@ -26,7 +26,7 @@ pub enum Status {
     OutOfCone = 9,
     /// The lengths have a pose, but not in the assembly mode of the guess; the pose stands.
     ModeJump = 10,
-    /// A revolute joint or a rod turns beyond its range; the numbers stand.
+    /// A revolute joint or a rod rotates beyond its range; the numbers stand.
     OutOfAngle = 11,
     /// The strut of a slider is too short to reach its rail.
     OutOfReach = 12,
@@ -65,7 +65,7 @@ impl Status {
         matches!(self, Status::Ok | Status::OutOfStroke | Status::OutOfCone | Status::OutOfAngle)
     }
 
-    /// What it means and what helps.
+    /// Meaning of the status, and a remedy.
     #[must_use]
     pub fn message(self) -> &'static str {
         match self {
@@ -77,7 +77,7 @@ impl Status {
             Status::Fold => {
                 "the coordinates do not determine the motion here: two of their branches meet (of the paper's where γ = 0 or 180°), or \
                  they depend on one another at every pose; the mechanism need not be singular, other coordinates may pass: \
-                 `polypod info` tells independent ones"
+                 `polypod info` lists independent ones"
             }
             Status::NotConverged => {
                 "no pose was found from the guess; give a guess nearer to the pose or check that it exists"
@@ -91,32 +91,35 @@ impl Status {
             }
             Status::OffConstraint => {
                 "the pose, twist or acceleration breaks a constraint of the mechanism; give only as many coordinates as it \
-                 has freedoms, so that the others follow (mech.state makes pose, twist and acceleration)"
+                 has degrees of freedom, so that the others follow (mech.state makes pose, twist and \
+                 acceleration)"
             }
             Status::BranchJump => {
                 "between the state before and this one the dependent coordinates passed a fold and came out on \
                  another branch; take smaller steps, or coordinates without this fold"
             }
             Status::OutOfCone => {
-                "a joint turns beyond its cone limit; the numbers stand, the machine cannot reach the pose"
+                "a joint rotates beyond its cone limit; the numbers stand, the machine cannot reach the pose"
             }
             Status::ModeJump => {
                 "on the way from the guess to these lengths its assembly mode ends in a singularity; the pose has the \
                  lengths but lies in another mode: give a guess in the mode that is meant, or ask for all assembly modes"
             }
             Status::OutOfAngle => {
-                "a revolute joint or a rod turns beyond its range; the numbers stand, the machine cannot reach the pose"
+                "a revolute joint or a rod rotates beyond its range; the numbers stand, the machine cannot reach the \
+                 pose"
             }
             Status::OutOfReach => {
                 "the strut of a slider is too short: from this pose it reaches its rail nowhere"
             }
             Status::OtherBranch => {
-                "the pose has the coordinates of its legs, but the strut of a slider leans to the other side of the square to \
-                 its rail than its branch says; give a guess nearer to the pose that is meant"
+                "the pose has the coordinates of its legs, but the strut of a slider leans to the other \
+                 side of the perpendicular to its rail than its branch says; give a guess nearer to the pose that is meant"
             }
             Status::Inconsistent => {
                 "the legs contradict one another: no pose nearby has all these lengths, or no motion all these rates or \
-                 accelerations; more legs are actuated than the platform has freedoms, so that they must agree (1e-6)"
+                 accelerations; more legs are actuated than the platform has degrees of freedom, so that they must \
+                 agree (1e-6)"
             }
             Status::Backwards => {
                 "a leg points backwards from its fixed joint (F), so that its length would be negative: the machine cannot be \

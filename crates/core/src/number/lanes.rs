@@ -91,7 +91,7 @@ impl Lanes for f64 {
     }
 }
 
-/// What is to be done with registers of any width.
+/// Work to be compiled for registers of any width.
 ///
 /// The functions for one instruction set are methods of the task, because the compiler puts a method into the codegen unit of
 /// the type that has it: so the tasks of different modules, which are most of what there is to compile, compile side by side.
@@ -161,6 +161,34 @@ pub trait Work<V>: Sized {
         self.run()
     }
 }
+
+/// A work with its fields, its result and what it does: a function of its own for each kind of register.
+///
+/// Instructions of AVX are inlined only into functions that are compiled for AVX, so that in these all operands lie in memory
+/// until then. The compiler's time to bring them into registers grows with the square of the function's length: long functions
+/// are divided so.
+macro_rules! work {
+    (
+        $(#[$doc:meta])*
+        $name:ident<$($life:lifetime),+, $v:ident> { $($field:ident: $type:ty),+ $(,)? } -> $result:ty $body:block
+    ) => {
+        $(#[$doc])*
+        struct $name<$($life),+, $v: $crate::number::lanes::Lanes> {
+            $($field: $type),+
+        }
+
+        impl<$($life),+, $v: $crate::number::lanes::Lanes> $crate::number::lanes::Work<$v> for $name<$($life),+, $v> {
+            type Result = $result;
+
+            #[inline(always)]
+            fn run(self) -> $result {
+                let $name { $($field),+ } = self;
+                $body
+            }
+        }
+    };
+}
+pub(crate) use work;
 
 /// Instruction sets of this kind of processor with the width of their registers, the narrowest first.
 #[cfg(target_arch = "x86_64")]

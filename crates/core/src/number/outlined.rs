@@ -1,6 +1,6 @@
-//! A number of many parts for maps that are long: how a pose with its rates varies. What it takes to multiply two is a
-//! function of its own, called rather than copied into the map, which would be some hundred thousand instructions for each
-//! kind of register.
+//! A dual-number type whose arithmetic is outlined (`#[inline(never)]`), to bound code size: for the
+//! variation of a pose with its rates. Inlined into the maps of the coordinate sets it would be some hundred
+//! thousand instructions for each kind of register.
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
@@ -11,7 +11,7 @@ use crate::number::real::{Constant, Dual, Jet, Mask, Real, Trig};
 type Parts<V> = Jet<Dual<V>>;
 
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Called<V>(pub Parts<V>);
+pub(crate) struct Outlined<V>(pub Parts<V>);
 
 /// Functions of one or two numbers that are called.
 macro_rules! called {
@@ -38,51 +38,51 @@ called! {
     Angle(y, x) -> Parts<V>: y.atan2(x);
 }
 
-impl<V: Lanes> Add for Called<V> {
+impl<V: Lanes> Add for Outlined<V> {
     type Output = Self;
     #[inline(always)]
     fn add(self, b: Self) -> Self {
-        Called(self.0 + b.0)
+        Outlined(self.0 + b.0)
     }
 }
 
-impl<V: Lanes> Sub for Called<V> {
+impl<V: Lanes> Sub for Outlined<V> {
     type Output = Self;
     #[inline(always)]
     fn sub(self, b: Self) -> Self {
-        Called(self.0 - b.0)
+        Outlined(self.0 - b.0)
     }
 }
 
-impl<V: Lanes> Mul for Called<V> {
+impl<V: Lanes> Mul for Outlined<V> {
     type Output = Self;
     #[inline(always)]
     fn mul(self, b: Self) -> Self {
-        Called(V::apart(Product(self.0, b.0)))
+        Outlined(V::apart(Product(self.0, b.0)))
     }
 }
 
-impl<V: Lanes> Div for Called<V> {
+impl<V: Lanes> Div for Outlined<V> {
     type Output = Self;
     #[inline(always)]
     fn div(self, b: Self) -> Self {
-        Called(V::apart(Quotient(self.0, b.0)))
+        Outlined(V::apart(Quotient(self.0, b.0)))
     }
 }
 
-impl<V: Lanes> Neg for Called<V> {
+impl<V: Lanes> Neg for Outlined<V> {
     type Output = Self;
     #[inline(always)]
     fn neg(self) -> Self {
-        Called(-self.0)
+        Outlined(-self.0)
     }
 }
 
-impl<V: Lanes> Real for Called<V> {
+impl<V: Lanes> Real for Outlined<V> {
     type Value = V;
     #[inline(always)]
     fn lit(x: f64) -> Self {
-        Called(Jet::lit(x))
+        Outlined(Jet::lit(x))
     }
     #[inline(always)]
     fn value(self) -> V {
@@ -90,37 +90,37 @@ impl<V: Lanes> Real for Called<V> {
     }
     #[inline(always)]
     fn sqrt(self) -> Self {
-        Called(V::apart(Root(self.0, self.0)))
+        Outlined(V::apart(Root(self.0, self.0)))
     }
     #[inline(always)]
     fn scale(self, x: f64) -> Self {
-        Called(self.0.scale(x))
+        Outlined(self.0.scale(x))
     }
     #[inline(always)]
     fn select(choose: Mask<Self>, a: Self, b: Self) -> Self {
-        Called(Jet::select(choose, a.0, b.0))
+        Outlined(Jet::select(choose, a.0, b.0))
     }
 }
 
-impl<V: Lanes> Trig for Called<V> {
+impl<V: Lanes> Trig for Outlined<V> {
     #[inline(always)]
     fn sin_cos(self) -> (Self, Self) {
         let (sine, cosine) = V::apart(SineAndCosine(self.0, self.0));
-        (Called(sine), Called(cosine))
+        (Outlined(sine), Outlined(cosine))
     }
     #[inline(always)]
     fn acos(self) -> Self {
-        Called(V::apart(ArcCosine(self.0, self.0)))
+        Outlined(V::apart(ArcCosine(self.0, self.0)))
     }
     #[inline(always)]
     fn atan2(self, x: Self) -> Self {
-        Called(V::apart(Angle(self.0, x.0)))
+        Outlined(V::apart(Angle(self.0, x.0)))
     }
 }
 
-impl<V: Lanes> Constant<Called<V>> for Dual<f64> {
+impl<V: Lanes> Constant<Outlined<V>> for Dual<f64> {
     #[inline(always)]
-    fn lift(self) -> Called<V> {
-        Called(self.lift())
+    fn lift(self) -> Outlined<V> {
+        Outlined(self.lift())
     }
 }

@@ -1,4 +1,4 @@
-//! The number that every equation is written for.
+//! Number types: the traits and types over which every equation is generic.
 //!
 //! [`Real`] is what a kernel may use: field operations, a square root, and [`Real::select`] in place of a branch.
 //! `f64` and [`F`] are numbers; [`Dual`] carries one derivative along, [`Jet`] a rate and a second rate, so that the
@@ -21,7 +21,7 @@ pub trait Real:
     + Neg<Output = Self>
     + 'static
 {
-    /// What numbers are compared by.
+    /// Type in which numbers are compared.
     type Value: Ordered;
 
     /// The constant `x`.

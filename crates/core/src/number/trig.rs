@@ -211,7 +211,7 @@ mod tests {
     use super::*;
     use crate::number::lanes::tests::on_each_width;
     use crate::number::lanes::{Lanes, Task};
-    use crate::numerics::random::Draw;
+    use crate::numerics::random::Random;
 
     const MANY: usize = 200_000;
 
@@ -245,13 +245,13 @@ mod tests {
     }
 
     /// Both signs of numbers of every size.
-    fn any_size(draw: &mut Draw) -> f64 {
+    fn any_size(draw: &mut Random) -> f64 {
         draw.number() * (draw.number() * 1000.0).round().exp2()
     }
 
     #[test]
     fn angles_up_to_a_hundred_thousand() {
-        let mut draw = Draw(1);
+        let mut draw = Random(1);
         for _ in 0..MANY {
             let x = draw.number();
             check_sin_cos(x);
@@ -271,7 +271,7 @@ mod tests {
 
     #[test]
     fn greater_angles_lose_digits_no_faster_than_their_spacing_grows() {
-        let mut draw = Draw(2);
+        let mut draw = Random(2);
         for _ in 0..MANY {
             let x = draw.number() * (17.0 + 33.9 * draw.number().abs()).exp2();
             let (s, c) = sin_cos(x);
@@ -285,7 +285,7 @@ mod tests {
 
     #[test]
     fn points_of_the_plane() {
-        let mut draw = Draw(3);
+        let mut draw = Random(3);
         for _ in 0..MANY {
             let (y, x) = (draw.number(), draw.number());
             check_atan2(y, x);
@@ -336,7 +336,7 @@ mod tests {
 
     #[test]
     fn cosines_up_to_one() {
-        let mut draw = Draw(4);
+        let mut draw = Random(4);
         for _ in 0..MANY {
             let x = draw.number();
             check_acos(x);
@@ -378,7 +378,7 @@ mod tests {
     #[test]
     fn lanes_are_doubles_bit_by_bit() {
         let ends = [0.0, -0.0, 1.0, -0.7, 4e15, f64::MAX, f64::from_bits(1), f64::INFINITY, f64::NAN];
-        let mut draw = Draw(5);
+        let mut draw = Random(5);
         let mut pairs: Vec<(f64, f64)> =
             ends.iter().flat_map(|&y| ends.map(|x| (y, x))).chain([(0.5, 0.5); 7]).collect();
         for _ in 0..MANY / 8 {

@@ -1,8 +1,8 @@
-//! The small linear system of the kernels, solved without a branch on a value.
+//! Gaussian elimination for the small linear systems of the kernels, without a branch on a value.
 
 use crate::number::real::{Ordered, Real};
 
-/// Solutions, and what the elimination tells of the matrix.
+/// Solutions, and pivots of the elimination.
 #[derive(Clone, Copy, Debug)]
 pub struct Solved<T: Real, X> {
     pub x: X,

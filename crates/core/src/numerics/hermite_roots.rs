@@ -1,5 +1,5 @@
-//! Where a function is zero that is known with its rate at some points: cubics between the points tell where to look,
-//! also for two zeros, or one that is only touched, between two points of the same sign \[T34\].
+//! Zeros of a function known with its derivative at some points, by cubic Hermite interpolation; also pairs
+//! of zeros and double zeros between two points of the same sign \[T34\].
 
 /// A function's value and rate at a point. The rate may be NaN where it is not known.
 #[derive(Clone, Copy, Debug)]
@@ -116,7 +116,7 @@ impl Cubic {
         a + u * (b + u * (c + u * d))
     }
 
-    /// Where the slope is zero, strictly inside, in order.
+    /// Zeros of the derivative, strictly inside, in order.
     fn extremes(&self) -> Vec<f64> {
         let [_, b, c, d] = self.coefficients;
         // b + 2 c u + 3 d u² = 0, each root by the form that does not cancel.
@@ -172,12 +172,12 @@ impl Cubic {
     }
 }
 
-/// What a search along a path found.
+/// Result of a search along a path.
 #[derive(Clone, Copy, Debug)]
-pub struct Found {
+pub struct FoundRoots {
     /// The first zero, if there is one.
     pub zero: Option<f64>,
-    /// How far the path was followed: to the reach, or to where the function ends.
+    /// End of the search: the reach, or the end of the function's domain.
     pub end: f64,
 }
 
@@ -190,10 +190,10 @@ pub fn first_zero(
     mut touches: impl FnMut(f64) -> bool,
     step: f64,
     reach: f64,
-) -> Found {
-    let Some(mut from) = at(0.0) else { return Found { zero: None, end: 0.0 } };
+) -> FoundRoots {
+    let Some(mut from) = at(0.0) else { return FoundRoots { zero: None, end: 0.0 } };
     if touches(0.0) {
-        return Found { zero: Some(0.0), end: 0.0 };
+        return FoundRoots { zero: Some(0.0), end: 0.0 };
     }
     let mut stride = step;
     while from.t < reach {
@@ -207,11 +207,11 @@ pub fn first_zero(
             continue;
         };
         if let Some(zero) = zero_within(&mut at, &mut touches, from, to) {
-            return Found { zero: Some(zero), end: zero };
+            return FoundRoots { zero: Some(zero), end: zero };
         }
         from = to;
     }
-    Found { zero: None, end: from.t }
+    FoundRoots { zero: None, end: from.t }
 }
 
 /// The first zero of one step: the function is evaluated where the cubics have events until these stay where they are.
@@ -241,7 +241,8 @@ fn zero_within(
 /// Share of a step below which two zeros are one.
 pub const RESOLUTION: f64 = 1e-4;
 
-/// How near a node must be to an event for it to be settled, and within what two zeros are one.
+/// Tolerances: distance of a node from an event at which it is settled, and distance below which two zeros
+/// are one.
 #[derive(Clone, Copy, Debug)]
 pub struct Precision {
     pub crossing: f64,

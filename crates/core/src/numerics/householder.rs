@@ -182,7 +182,7 @@ fn reflect<V: Ordered>(v: &[V], share: V, x: &mut [V]) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::numerics::random::Draw;
+    use crate::numerics::random::Random;
     use crate::numerics::svd::Svd;
     use nalgebra::{DMatrix, DVector};
 
@@ -199,7 +199,7 @@ mod tests {
 
     #[test]
     fn solutions_are_least_and_the_rest_is_open() {
-        let mut draw = Draw(11);
+        let mut draw = Random(11);
         for (rows, columns) in [(1, 1), (5, 6), (7, 9), (6, 6), (3, 8), (0, 2)] {
             let m = DMatrix::from_fn(rows, columns, |_, _| draw.number());
             let b = DVector::from_fn(rows, |_, _| draw.number());

@@ -1,12 +1,12 @@
-//! Random numbers that are the same every time: any fixed generic direction will do.
+//! Reproducible pseudo-random numbers, for generic points and directions.
 
 use crate::number::complex::Complex;
 use crate::spatial::Vec3;
 
 /// The generator xorshift64*.
-pub struct Draw(pub u64);
+pub struct Random(pub u64);
 
-impl Draw {
+impl Random {
     /// Uniform in (-1, 1).
     pub fn number(&mut self) -> f64 {
         self.0 ^= self.0 >> 12;

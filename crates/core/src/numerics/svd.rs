@@ -51,7 +51,7 @@ impl Svd {
     }
 }
 
-/// Makes every pair of columns of u square once, v following; whether any had to turn.
+/// Makes every pair of columns of u square once, v following; whether any had to rotate.
 fn sweep(u: &mut DMatrix<f64>, v: &mut DMatrix<f64>, nothing: f64) -> bool {
     let mut turned = false;
     for j in 1..u.ncols() {
@@ -61,8 +61,8 @@ fn sweep(u: &mut DMatrix<f64>, v: &mut DMatrix<f64>, nothing: f64) -> bool {
             if a.min(b) <= nothing || product.abs() <= SQUARE * (a * b).sqrt() {
                 continue;
             }
-            // The lesser turn that makes them square: t = tan of its angle, t² + 2 ζ t = 1. What was passed over above
-            // keeps ζ below 1e31, so that its square is finite.
+            // The smaller rotation that makes them orthogonal: t = tan of its angle, t² + 2 ζ t = 1. What was
+            // passed over above keeps ζ below 1e31, so that its square is finite.
             let zeta = (b - a) / (2.0 * product);
             let t = zeta.signum() / (zeta.abs() + (zeta * zeta + 1.0).sqrt());
             let cos = 1.0 / (t * t + 1.0).sqrt();
@@ -85,7 +85,7 @@ fn rotate(m: &mut DMatrix<f64>, i: usize, j: usize, cos: f64, sin: f64) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::numerics::random::Draw;
+    use crate::numerics::random::Random;
 
     fn check(m: &DMatrix<f64>) -> Svd {
         let svd = Svd::of(m).unwrap();
@@ -99,13 +99,13 @@ mod tests {
         svd
     }
 
-    fn random(rows: usize, columns: usize, draw: &mut Draw) -> DMatrix<f64> {
+    fn random(rows: usize, columns: usize, draw: &mut Random) -> DMatrix<f64> {
         DMatrix::from_fn(rows, columns, |_, _| draw.number())
     }
 
     #[test]
     fn values_are_those_that_the_matrix_was_made_of() {
-        let mut draw = Draw(7);
+        let mut draw = Random(7);
         for (rows, columns) in [(6, 6), (9, 4), (24, 24), (3, 6)] {
             let least = rows.min(columns);
             let (left, right) =
@@ -127,7 +127,7 @@ mod tests {
 
     #[test]
     fn equal_values_zeros_and_nothing_at_all() {
-        let mut draw = Draw(8);
+        let mut draw = Random(8);
         assert_eq!(check(&DMatrix::identity(6, 6)).values, DVector::from_element(6, 1.0));
         assert_eq!(check_of_zero(&DMatrix::zeros(6, 6)), DVector::zeros(6));
         let twice = random(6, 3, &mut draw);

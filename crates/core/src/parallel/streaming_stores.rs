@@ -1,12 +1,12 @@
-//! Writing past the caches. An array that is too long to stay in them would be read before it is written, line by line, only
-//! to be put out again: half of what the memory has to move.
+//! Non-temporal (streaming) stores, past the caches. An array that is too long to stay in them would be read
+//! before it is written, line by line, and evicted again: half of the memory traffic.
 
 use std::mem::MaybeUninit;
 
 /// Bytes of a line of the caches.
 const LINE: usize = 64;
 
-/// Whether a line begins there: half a line is not written past the caches at once.
+/// Whether an address is aligned to a cache line: a streaming store writes whole lines.
 #[inline(always)]
 pub(crate) fn begins_line(places: &[MaybeUninit<f64>]) -> bool {
     places.as_ptr().addr().is_multiple_of(LINE)

@@ -1,5 +1,5 @@
-//! How far apart struts are from each other and from the platform: distances between segments, and between a
-//! segment and a convex body \[T37\]. All are exact, also for parallel, crossing and vanishing segments.
+//! Distances between struts, and between a strut and the platform: of segments, and of a segment and a convex
+//! body \[T37\]. All are exact, also for parallel, crossing and vanishing segments.
 
 use crate::number::real::{Constant, Ordered, Real};
 use crate::spatial::vector::Vec3;
@@ -20,7 +20,7 @@ impl<T: Real> Segment<T> {
         self.0 + self.vector() * t
     }
 
-    /// What is left when `start` and `end` of its length are cut off, at most half of it each.
+    /// The segment shortened by `start` and `end` of its length, at most half of it each.
     #[must_use]
     #[inline(always)]
     pub fn without(&self, [start, end]: [f64; 2]) -> Self {
@@ -139,7 +139,7 @@ struct Facet {
     corners: Vec<Vec3<f64>>,
     /// From each corner to the next.
     edges: Vec<Line<f64>>,
-    /// In the plane, square to the edge from each corner to the next, inwards.
+    /// In the plane, perpendicular to the edge from each corner to the next, inwards.
     inward: Vec<Vec3<f64>>,
     /// Unit vector, out of the body; zero for a line or a point.
     normal: Vec3<f64>,

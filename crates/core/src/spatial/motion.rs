@@ -16,8 +16,8 @@ pub struct Pose<T> {
 }
 
 impl<T: Real> Pose<T> {
-    /// The pose after the finite step `(v, w)`: o moves by v and the axes turn by the Cayley map of w, which agrees
-    /// with the rotation by the vector w to second order and needs no trigonometry \[T26\].
+    /// The pose after the finite step `(v, w)`: o moves by v and the axes rotate by the Cayley map of w,
+    /// which agrees with the rotation by the vector w to second order and needs no trigonometry \[T26\].
     #[must_use]
     #[inline(always)]
     pub fn stepped(&self, step: &Twist<T>) -> Self {
@@ -136,7 +136,7 @@ impl<T: Real> Wrench<T> {
         Wrench::new(force, e.cross(force))
     }
 
-    /// The same wrench, its torque about a point that is `back` behind the point it is given at.
+    /// Wrench with its torque about the point that lies `back` behind the given one.
     #[must_use]
     #[inline(always)]
     pub fn moved(self, back: Vec3<T>) -> Self {

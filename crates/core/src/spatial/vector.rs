@@ -111,7 +111,7 @@ impl Vec3<f64> {
 }
 
 impl<T: Scalar> Vec3<T> {
-    /// A unit vector square to this one, on the side of the base axis that this one leans on least.
+    /// A unit vector perpendicular to this one, on the side of the base axis that this one leans on least.
     #[must_use]
     pub fn perpendicular(self) -> Self {
         let [x, y, z] = self.map(|c| c.value().abs()).array();
@@ -204,28 +204,28 @@ impl<T: Real> Mat3<T> {
         Vec3::new(x.dot(a), y.dot(a), z.dot(a))
     }
 
-    /// Turn by `angle`, given as its sine and cosine, about x.
+    /// Rotation by `angle`, given as its sine and cosine, about x.
     #[inline(always)]
     pub fn rotation_x((s, c): (T, T)) -> Self {
         let (i, o) = (T::one(), T::zero());
         Mat3::from_rows([[i, o, o], [o, c, -s], [o, s, c]])
     }
 
-    /// Turn about y.
+    /// Rotation about y.
     #[inline(always)]
     pub fn rotation_y((s, c): (T, T)) -> Self {
         let (i, o) = (T::one(), T::zero());
         Mat3::from_rows([[c, o, s], [o, i, o], [-s, o, c]])
     }
 
-    /// Turn about z.
+    /// Rotation about z.
     #[inline(always)]
     pub fn rotation_z((s, c): (T, T)) -> Self {
         let (i, o) = (T::one(), T::zero());
         Mat3::from_rows([[c, -s, o], [s, c, o], [o, o, i]])
     }
 
-    /// The shortest turn that takes the unit vector `a` to the unit vector `b`; undefined for `b = -a`.
+    /// The shortest rotation that takes the unit vector `a` to the unit vector `b`; undefined for `b = -a`.
     #[inline(always)]
     pub fn shortest_turn(a: Vec3<T>, b: Vec3<T>) -> Self {
         let w = a.cross(b);
@@ -280,7 +280,7 @@ impl<T: Real> Mat3<T> {
 }
 
 impl<T: Trig + Scalar> Mat3<T> {
-    /// Rodrigues' formula for the turn by |w| about w.
+    /// Rodrigues' formula for the rotation by |w| about w.
     #[must_use]
     pub fn from_rotation_vector(w: Vec3<T>) -> Self {
         let angle = w.norm();
@@ -298,7 +298,7 @@ impl<T: Trig + Scalar> Mat3<T> {
 }
 
 impl Mat3<f64> {
-    /// The inverse of [`Mat3::from_rotation_vector`] for turns below a half turn.
+    /// The inverse of [`Mat3::from_rotation_vector`] for rotations below a half turn.
     #[must_use]
     pub fn rotation_vector(self) -> Vec3<f64> {
         let [a, b, c] = self.0;

@@ -1,4 +1,4 @@
-//! Whether the platform can be at a place: a pose with its point o there that keeps constraints and limits \[T39\].
+//! Orientation fit: a pose with its point o at a given point that keeps constraints and limits \[T39\].
 
 use crate::dynamics::force_balance::ForceSolver;
 use crate::dynamics::inverse_dynamics;
@@ -15,7 +15,7 @@ const STEPS: usize = 40;
 /// Longest step, rad.
 const LONGEST_STEP: f64 = 0.2;
 
-/// How far a limit may be passed, in its unit, and a constraint missed, as a pure number: rounding of zero.
+/// Tolerances for a limit, in its unit, and for a constraint, as a pure number: rounding of zero.
 pub const ON_LIMIT: f64 = 1e-11;
 const ON_CONSTRAINT: f64 = 1e-13;
 
@@ -27,14 +27,15 @@ const DAMPING: f64 = 1e-12;
 
 /// The rotation next to that of `pose` with which the platform can be at `o`; none where the search finds none.
 ///
-/// Gauss-Newton steps on the constraints and on the limits that are passed, of least size: what need not turn does
-/// not. Limits that are no function of the pose alone in closed form (conditioning, forces) are checked, not sought.
+/// Gauss-Newton steps on the constraints and on the limits that are passed, of least size: what need not
+/// rotate does not. Limits that are no function of the pose alone in closed form (conditioning, forces) are
+/// checked, not sought.
 #[must_use]
 pub fn fit(mech: &Mechanism, pose: &Pose<f64>, o: Vec3<f64>) -> Option<Pose<f64>> {
     let mut pose = Pose { rotation: pose.rotation, o };
     let mut misses = [f64::INFINITY; 2];
     for _ in 0..STEPS {
-        // Normal equations of rows a·w = b for the turn w.
+        // Normal equations of rows a·w = b for the rotation w.
         let mut matrix = [[0.0; 3]; 3];
         let mut rhs = [0.0; 3];
         let mut miss = 0.0_f64;
@@ -85,7 +86,7 @@ pub fn fit(mech: &Mechanism, pose: &Pose<f64>, o: Vec3<f64>) -> Option<Pose<f64>
     None
 }
 
-/// The derivative of a limit's margin by a turn of the platform about o, by duals.
+/// The derivative of a limit's margin by a rotation of the platform about o, by duals.
 fn gradient(mech: &Mechanism, limit: &Limit, pose: &Pose<f64>) -> Vec3<f64> {
     let along = |axis: Vec3<f64>| {
         let turning = pose.along(&Twist::new(Vec3::zero(), axis));

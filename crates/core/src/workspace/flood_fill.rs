@@ -31,7 +31,7 @@ const SMALL_PIECES: u32 = 16;
 /// Nodes are the middles of cells: where the grid ends, so does the last cell.
 const HALF_CELL: f64 = 0.5;
 
-/// How exactly the boundary is found on an edge, m.
+/// Precision of the boundary on an edge, m.
 const EXACT: f64 = 1e-12;
 
 /// Margin, in the limit's unit, at which it is what stops the platform.
@@ -182,14 +182,15 @@ impl Flood {
             .collect()
     }
 
-    /// Where the boundary cuts the edges between reached and unreached nodes, in the order of the reached ones.
+    /// Intersections of the boundary with the edges between reached and unreached nodes, in the order of the
+    /// reached ones.
     #[must_use]
     pub fn edges(&self, mech: &Mechanism) -> Vec<Edge> {
         let open = self.open();
         open.par_iter().map(|&(node, d, rotation)| self.edge(mech, node, d, rotation)).collect()
     }
 
-    /// Bisects an edge for the last place that can be reached from its inner node.
+    /// Bisects an edge for the last point that can be reached from its inner node.
     fn edge(&self, mech: &Mechanism, node: usize, direction: usize, rotation: Mat3<f64>) -> Edge {
         let inner = self.grid.point(self.grid.place(node));
         let next = self.grid.neighbour(node, direction);
@@ -221,7 +222,7 @@ impl Flood {
     }
 }
 
-/// Where the boundary cuts an edge of the grid.
+/// Intersection of the boundary with an edge of the grid.
 #[derive(Clone, Copy, Debug)]
 pub struct Edge {
     /// The reached node and the direction of the edge.
@@ -236,7 +237,7 @@ pub struct Edge {
     pub margin: f64,
 }
 
-/// What keeps the platform from going further.
+/// Cause of a point of the workspace boundary.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stop {
     /// On the boundary several limits may bind at once: the first of them in the mechanism's order.

@@ -1,10 +1,10 @@
 //! Steps from poses to other lengths, many side by side in lanes \[T41\], \[T65\]: where each leads to first order, and
 //! the way itself, followed to its end.
 
-use crate::forward_kinematics::newton::{Asked, step_of, system};
-use crate::forward_kinematics::newton_lanes::{ARRIVED, BEGINNING, GOING, Newton, Piece, Pieces, newton};
+use crate::forward_kinematics::newton::{LegTarget, step_of, system};
+use crate::forward_kinematics::newton_lanes::{ARRIVED, BEGINNING, GOING, NewtonStep, Piece, Pieces, newton};
 use crate::kinematics::leg;
-use crate::limits::margins::Seen;
+use crate::limits::margins::LegCache;
 use crate::model::limit::Limit;
 use crate::model::mechanism::Mechanism;
 use crate::model::status::Status;
@@ -21,7 +21,8 @@ const PIECES: u32 = 64;
 /// Share of a predicted step within which a known pose is the one that the step leads to.
 const PREDICTED: f64 = 0.25;
 
-/// Where the marker is in platform axes, in characteristic lengths: off every symmetry that a platform may have.
+/// Position of the marker in platform axes, in characteristic lengths: off every symmetry that a platform may
+/// have.
 const MARKER: Vec3<f64> = Vec3 { x: 0.53, y: 0.31, z: 0.79 };
 
 /// A bit for every lane.
@@ -30,12 +31,12 @@ const ALL: u32 = (1 << WIDTH) - 1;
 /// Actuated legs at most.
 pub(super) const AXES: usize = 6;
 
-/// Where a pose has the point by which it is known.
+/// Position of the marker point that identifies a pose.
 pub(super) fn marker(mech: &Mechanism, pose: &Pose<f64>) -> Vec3<f64> {
     pose.o + pose.rotation * (MARKER * mech.characteristic_length)
 }
 
-/// Where poses may be.
+/// Region of admissible poses.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Room<'a> {
     pub mech: &'a Mechanism,
@@ -64,7 +65,7 @@ impl Room<'_> {
             let ahead = leg::ahead(self.mech, direction, pose);
             inside = V::select(ahead.greater(V::zero()), inside, V::zero());
         }
-        let mut seen = Seen::default();
+        let mut seen = LegCache::default();
         for limit in &self.mech.limits {
             if is_of_joint(limit) {
                 let margin = limit.bound.margin(limit.of_joint(self.mech, pose, &mut seen));
@@ -94,7 +95,7 @@ fn is_of_joint(limit: &Limit) -> bool {
 pub(super) struct Predicted {
     /// Of the marker, for both directions of each axis.
     markers: [[[Row; 3]; 2]; AXES],
-    /// How far from there the marker of the pose that a step leads to may be, m.
+    /// Tolerance for the marker of the pose that a step leads to, m.
     within: [[Row; 2]; AXES],
 }
 
@@ -144,7 +145,7 @@ impl Task for Prediction<'_> {
                 unit[i][i] = V::one();
             }
             // One elimination for all directions: only one length changes in each.
-            let columns = solve_all(system(mech, &pose, &[Asked::none(); 6]).matrix, unit).x;
+            let columns = solve_all(system(mech, &pose, &[LegTarget::none(); 6]).matrix, unit).x;
             let arm = pose.rotation * Vec3::<V>::lift(MARKER * scale);
             for axis in 0..axes {
                 for direction in 0..2 {
@@ -180,11 +181,11 @@ pub(super) struct Way {
     /// The last pose on it that is inside, and its share of the way in shortest pieces.
     pose: Pose<f64>,
     share: u32,
-    /// What is tried next, in shortest pieces.
+    /// Length of the next piece to try, in shortest pieces.
     piece: u32,
 }
 
-/// What is met on a way.
+/// Event on a path.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Met {
     /// A pose at the end of a piece, with its o.
@@ -396,7 +397,7 @@ impl Task for Advance<'_> {
         let mut k = 0;
         while k < WIDTH {
             let pose: Pose<V> = load(self.poses, k);
-            let Newton { next, size, sign, .. } = newton(self.mech, &pose, self.ahead, k);
+            let NewtonStep { next, size, sign, .. } = newton(self.mech, &pose, self.ahead, k);
             let mut piece = Piece::load(self.pieces, k);
             let (course, made) = piece.judge(size, sign);
             store(&chosen(made, &next, &pose), self.poses, k);

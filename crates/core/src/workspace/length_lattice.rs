@@ -34,7 +34,7 @@ struct Axis {
 }
 
 impl Axis {
-    /// Where a node is along the axis.
+    /// Index of a node along the axis.
     fn place(&self, node: usize) -> usize {
         node / self.stride % self.count
     }
@@ -80,7 +80,7 @@ struct Step {
     /// The pose that it is made from, by its place in the front.
     source: u32,
     node: usize,
-    /// Where the marker is at its end to first order, and how far from there it may be, m.
+    /// First-order prediction of the marker's position at the end, and its tolerance, m.
     marker: [f32; 3],
     within: f32,
 }
@@ -103,7 +103,7 @@ pub struct Lattice {
     pub layers: (f64, f64),
 }
 
-/// What the waves have met: poses inside all limits, each reached from another one by a step to a neighbour.
+/// Poses reached by the search: inside all limits, each by a step from a neighbouring node.
 #[derive(Clone, Debug)]
 pub struct Reached {
     /// Nodes with such a pose.
@@ -127,7 +127,7 @@ impl Reached {
         Reached { inside: 0, poses: 0, at_limits: 0, singular: 0, extents: [none; 3], profile }
     }
 
-    /// Takes a place of o into the extents.
+    /// Takes a position of o into the extents.
     fn record(&mut self, o: Vec3<f64>, layers: (f64, f64)) {
         let o = o.array();
         widen(self.extents.as_flattened_mut(), &[o[0], o[0], o[1], o[1], o[2], o[2]]);
@@ -166,7 +166,7 @@ impl Slab {
         Slab { first, last: vec![NONE; nodes], known: vec![], awaited: vec![false; nodes] }
     }
 
-    /// The last of the poses known at a node whose marker is within a distance of a place.
+    /// The last of the poses known at a node whose marker is within a distance of a point.
     fn find(&self, node: usize, place: [f32; 3], within: f32) -> Option<usize> {
         let mut at = self.last[node - self.first];
         while let Some(known) = self.known.get(at as usize) {
@@ -202,7 +202,7 @@ impl Front {
         }
     }
 
-    /// The same poses in the order of their nodes.
+    /// Copy with the poses in the order of their nodes.
     fn in_order(&self) -> Self {
         let mut order: Vec<usize> = (0..self.nodes.len()).collect();
         order.sort_by_key(|&i| self.nodes[i]);
@@ -444,7 +444,7 @@ impl Lattice {
 mod tests {
     use super::*;
     use crate::common::published;
-    use crate::forward_kinematics::newton::{Asked, continuation, size, step_of, system};
+    use crate::forward_kinematics::newton::{LegTarget, continuation, size, step_of, system};
     use crate::kinematics::coordinate_sets::Set;
     use crate::model::limit::Limit;
     use crate::model::spec::Axes;
@@ -482,7 +482,7 @@ mod tests {
         ways
     }
 
-    /// The same way alone, by what defines it.
+    /// Path followed alone, by its definition.
     fn alone(mech: &Mechanism, pose: &Pose<f64>, [from, to]: &[[f64; 6]; 2]) -> Vec<Met> {
         // Shares of the way that are to be reached next, the nearest one last.
         let (mut pose, mut share, mut goals, mut met) = (*pose, 0.0, vec![1.0], vec![]);
@@ -491,7 +491,7 @@ mod tests {
                 if from[k] == to[k] { to[k] } else { (1.0 - goal) * from[k] + goal * to[k] }
             });
             let ahead: [f64; 6] = ahead;
-            let asked = ahead.map(|square| Asked { place: 0.0, square });
+            let asked = ahead.map(|square| LegTarget { place: 0.0, square });
             let found = continuation(mech, &asked, &pose, 1.0).0;
             let inside = |pose: &Pose<f64>| {
                 let o = pose.o.array();
@@ -512,7 +512,7 @@ mod tests {
         met
     }
 
-    /// What is met on each way, of those that are followed together.
+    /// Poses met on each path, paths followed side by side.
     fn followed(mech: &Mechanism, ways: &[Way]) -> Vec<Vec<Met>> {
         let mut met = vec![vec![]; ways.len()];
         let room = Room { mech, bounds: &BOUNDS };
@@ -524,7 +524,7 @@ mod tests {
         met
     }
 
-    /// The same, but for the rounding of registers that fuse.
+    /// Equality up to the rounding of fused registers.
     fn near(a: &Met, b: &Met) -> bool {
         match (a, b) {
             (Met::Place(a), Met::Place(b)) => (*a - *b).norm() < 1e-9,
@@ -576,7 +576,7 @@ mod tests {
                 let at = system(
                     &mech,
                     pose,
-                    &lattice.squares(step.node).map(|square| Asked { place: 0.0, square }),
+                    &lattice.squares(step.node).map(|square| LegTarget { place: 0.0, square }),
                 );
                 let x = solve(at.matrix, at.residual.map(|f| -f)).x;
                 let next = pose.stepped(&step_of(&mech, x, 1.0));

@@ -117,14 +117,16 @@ pub fn with_leg(letters: &str, seed: u64) -> Mechanism {
     generic(letters, &legs, 0, dof, seed)
 }
 
-/// A pose that keeps the constraints of [`with_leg`], with the first leg turned about and as long as at home.
+/// A pose that keeps the constraints of [`with_leg`], with the first leg rotated about and as long as at
+/// home.
 pub fn with_leg_backwards(mech: &Mechanism) -> Pose<f64> {
     let r = leg::position(&mech.legs[0], &mech.home).r;
     Pose { o: mech.home.o - r * 2.0, ..mech.home }
 }
 
-/// A mechanism whose last `count` legs are RPU on one rod, in planes of their own, with UPS legs for what freedoms
-/// they leave. Sliding along the rod and turning about it always remain, so that the third leg adds one constraint only.
+/// A mechanism whose last `count` legs are RPU on one rod, in planes of their own, with UPS legs for what
+/// degrees of freedom they leave. Sliding along the rod and rotating about it always remain, so that the
+/// third leg adds one constraint only.
 pub fn on_rod(count: usize, seed: u64) -> Mechanism {
     let dof: usize = [5, 3, 2][count - 1];
     let mut legs = vec!["UPS".to_owned(); dof.saturating_sub(count).max(1)];
@@ -132,7 +134,8 @@ pub fn on_rod(count: usize, seed: u64) -> Mechanism {
     generic(&format!("{count} on a rod"), &legs, count, dof, seed)
 }
 
-/// More legs than it takes: two with pins below and UPS legs for more than the freedoms that they leave.
+/// More legs than it takes: two with pins below and UPS legs for more than the degrees of freedom that they
+/// leave.
 pub fn redundant(seed: u64) -> Mechanism {
     let letters: Vec<String> = ["UPS", "UPS", "UPS", "UPS", "UPS", "RPS", "RPS"].map(str::to_owned).to_vec();
     generic("redundant", &letters, 0, 7, seed)
@@ -178,10 +181,10 @@ fn generic_spec(
         let symmetric = base == "S" && platform == "S";
         let mut tilts = [0.5 * draw.number(), 0.5 * draw.number()];
         if joints == "PUU" {
-            tilts[0] = 0.9; // its axis is the rail, which must be far from square to the strut
+            tilts[0] = 0.9; // its axis is the rail, which must be far from perpendicular to the strut
         }
         let slider = joints.starts_with('P').then(|| {
-            // The rail is far from square to the strut, the carriage somewhere on it.
+            // The rail is far from perpendicular to the strut, the carriage somewhere on it.
             let side = n.cross(delta);
             let axis = match (base, platform) {
                 ("R", _) => delta + side * 0.7,

@@ -6,7 +6,7 @@
 mod slider;
 mod telescope;
 
-use crate::kinematics::leg_state::{End, Frame, PointMotion, Position, State, Turn};
+use crate::kinematics::leg_state::{EndMotion, Frame, LegRotation, LegState, PointMotion, Position};
 use crate::kinematics::quadratic_forms::{Hessian, add_centripetal, point_columns};
 use crate::model::drive::Drive;
 use crate::model::mechanism::Body;
@@ -73,7 +73,7 @@ impl<S> Drive<S> {
     /// How the coordinate and δ move with the platform end, whose velocity and acceleration are given in base axes
     /// \[T3\] \[T4\] \[T68\].
     #[inline(always)]
-    pub fn end<T: Real>(&self, p: &Position<T>, f: &Frame<T>, v_b: Vec3<T>, a_b: Vec3<T>) -> End<T>
+    pub fn end<T: Real>(&self, p: &Position<T>, f: &Frame<T>, v_b: Vec3<T>, a_b: Vec3<T>) -> EndMotion<T>
     where
         S: Constant<T>,
     {
@@ -92,26 +92,27 @@ impl<S> Drive<S> {
 
     /// The motion of the first link's mass centre, from B or from the strut's foot [Eq. 38, 39] \[T8\].
     #[inline(always)]
-    pub fn first_link<T: Real>(&self, center: Vec3<f64>, state: &State<T>) -> PointMotion<T>
+    pub fn first_link<T: Real>(&self, center: Vec3<f64>, state: &LegState<T>) -> PointMotion<T>
     where
         S: Constant<T>,
     {
         ask!(self, first_link(center, state))
     }
 
-    /// The first link's axes, and how it turns along them; of a carriage, which has no inertia, those of the leg.
+    /// The first link's axes, and how it rotates along them; of a carriage, which has no inertia, those of
+    /// the leg.
     #[inline(always)]
-    pub fn first_turn<T: Real>(&self, state: &State<T>) -> (Mat3<T>, Turn<T>)
+    pub fn first_turn<T: Real>(&self, state: &LegState<T>) -> (Mat3<T>, LegRotation<T>)
     where
         S: Constant<T>,
     {
         ask!(self, first_turn(state))
     }
 
-    /// What weight and inertia of the first link do along the coordinate where it does not turn with the leg \[T69\]; zero
-    /// where it does.
+    /// Generalised force of the first link's weight and inertia along the coordinate, if the link does not
+    /// rotate with the leg \[T69\]; zero if it does.
     #[inline(always)]
-    pub fn own_force<T: Real>(&self, body: &Body, gravity: Vec3<T>, state: &State<T>) -> T
+    pub fn own_force<T: Real>(&self, body: &Body, gravity: Vec3<T>, state: &LegState<T>) -> T
     where
         S: Constant<T>,
     {
@@ -127,7 +128,8 @@ impl<S> Drive<S> {
         ask!(self, active(reaction, p))
     }
 
-    /// What its joint alone does to the leg: a twist at o, of any size that is not far from the strut's length and a turn of one.
+    /// Twist of the leg at o by its prismatic joint alone, of a size comparable with the strut's length and a
+    /// unit rotation.
     #[inline(always)]
     pub fn twist<T: Real>(&self, p: &Position<T>) -> Twist<T>
     where

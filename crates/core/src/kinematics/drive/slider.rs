@@ -1,7 +1,7 @@
 //! A strut whose foot slides on a rail: the coordinate is the place of its carriage \[T67\]-\[T69\].
 
 use super::swing;
-use crate::kinematics::leg_state::{End, Frame, PointMotion, Position, State, Turn};
+use crate::kinematics::leg_state::{EndMotion, Frame, LegRotation, LegState, PointMotion, Position};
 use crate::kinematics::quadratic_forms::Hessian;
 use crate::model::drive::Slider;
 use crate::model::mechanism::Body;
@@ -40,7 +40,7 @@ impl<S> Slider<S> {
         base + self.a::<T>() * p.coordinate
     }
 
-    /// δ·a, zero where the strut is square to its rail.
+    /// δ·a, zero where the strut is perpendicular to its rail.
     #[inline(always)]
     pub(super) fn transmission<T: Real>(&self, p: &Position<T>) -> T
     where
@@ -75,7 +75,13 @@ impl<S> Slider<S> {
     }
 
     #[inline(always)]
-    pub(super) fn end<T: Real>(&self, p: &Position<T>, f: &Frame<T>, v_b: Vec3<T>, a_b: Vec3<T>) -> End<T>
+    pub(super) fn end<T: Real>(
+        &self,
+        p: &Position<T>,
+        f: &Frame<T>,
+        v_b: Vec3<T>,
+        a_b: Vec3<T>,
+    ) -> EndMotion<T>
     where
         S: Constant<T>,
     {
@@ -90,7 +96,7 @@ impl<S> Slider<S> {
         let square = rate[0].mul_add(rate[0], rate[1] * rate[1]);
         let second = p.length.mul_add(square, a.y) * share;
         let delta_acceleration = [(a.x - second * d.x) * inverse, (a.z - second * d.z) * inverse];
-        End { v_b, a_b, rate: q, acceleration: second, delta_rate: rate, delta_acceleration }
+        EndMotion { v_b, a_b, rate: q, acceleration: second, delta_rate: rate, delta_acceleration }
     }
 
     #[inline(always)]
@@ -98,31 +104,31 @@ impl<S> Slider<S> {
     where
         S: Constant<T>,
     {
-        // δ' = (v_b - (δ·v_b) a/(δ·a))/c: what turns the strut along the rail is felt along δ.
+        // δ' = (v_b - (δ·v_b) a/(δ·a))/c: what rotates the strut along the rail is felt along δ.
         let d = f.axes.transpose_mul(self.a());
         force.y - ((n - force.x) * d.x + (m - force.z) * d.z) / d.y
     }
 
-    /// The carriage does not turn.
+    /// The carriage does not rotate.
     #[inline(always)]
-    pub(super) fn first_link<T: Real>(&self, center: Vec3<f64>, state: &State<T>) -> PointMotion<T>
+    pub(super) fn first_link<T: Real>(&self, center: Vec3<f64>, state: &LegState<T>) -> PointMotion<T>
     where
         S: Constant<T>,
     {
-        let (a, End { rate, acceleration, .. }) = (self.a::<T>(), state.end);
+        let (a, EndMotion { rate, acceleration, .. }) = (self.a::<T>(), state.end);
         PointMotion { offset: Vec3::lift(center), velocity: a * rate, acceleration: a * acceleration }
     }
 
-    /// Any will do: a carriage has no inertia here, as it does not turn.
+    /// Any will do: a carriage has no inertia here, as it does not rotate.
     #[allow(clippy::unused_self)] // as of all drives
     #[inline(always)]
-    pub(super) fn first_turn<T: Real>(&self, state: &State<T>) -> (Mat3<T>, Turn<T>) {
+    pub(super) fn first_turn<T: Real>(&self, state: &LegState<T>) -> (Mat3<T>, LegRotation<T>) {
         (state.frame.axes, state.turn)
     }
 
     /// The carriage's power is this times q'.
     #[inline(always)]
-    pub(super) fn own_force<T: Real>(&self, body: &Body, gravity: Vec3<T>, state: &State<T>) -> T
+    pub(super) fn own_force<T: Real>(&self, body: &Body, gravity: Vec3<T>, state: &LegState<T>) -> T
     where
         S: Constant<T>,
     {

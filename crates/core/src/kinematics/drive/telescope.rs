@@ -1,7 +1,7 @@
 //! A telescopic leg: the coordinate is its length.
 
 use super::swing;
-use crate::kinematics::leg_state::{End, Frame, PointMotion, Position, State, Turn};
+use crate::kinematics::leg_state::{EndMotion, Frame, LegRotation, LegState, PointMotion, Position};
 use crate::kinematics::quadratic_forms::Hessian;
 use crate::model::drive::Telescope;
 use crate::model::mechanism::Body;
@@ -40,7 +40,13 @@ impl Telescope {
     }
 
     #[inline(always)]
-    pub(super) fn end<T: Real>(&self, p: &Position<T>, f: &Frame<T>, v_b: Vec3<T>, a_b: Vec3<T>) -> End<T> {
+    pub(super) fn end<T: Real>(
+        &self,
+        p: &Position<T>,
+        f: &Frame<T>,
+        v_b: Vec3<T>,
+        a_b: Vec3<T>,
+    ) -> EndMotion<T> {
         let inverse = T::one() / p.length;
         let (v, a) = (f.axes.transpose_mul(v_b), f.axes.transpose_mul(a_b));
         // In the leg's axes: [Eq. 6] [T3] ℓ' = δ·v_b;  δ' = (v_b - ℓ'δ)/ℓ
@@ -49,7 +55,7 @@ impl Telescope {
         let second = v.x.mul_add(rate[0], v.z.mul_add(rate[1], a.y));
         let twice = v.y + v.y;
         let delta_acceleration = [(a.x - twice * rate[0]) * inverse, (a.z - twice * rate[1]) * inverse];
-        End { v_b, a_b, rate: v.y, acceleration: second, delta_rate: rate, delta_acceleration }
+        EndMotion { v_b, a_b, rate: v.y, acceleration: second, delta_rate: rate, delta_acceleration }
     }
 
     #[inline(always)]
@@ -59,17 +65,17 @@ impl Telescope {
 
     /// The cylinder turns with the leg about B.
     #[inline(always)]
-    pub(super) fn first_link<T: Real>(&self, center: Vec3<f64>, state: &State<T>) -> PointMotion<T> {
+    pub(super) fn first_link<T: Real>(&self, center: Vec3<f64>, state: &LegState<T>) -> PointMotion<T> {
         state.point_motion(center, Vec3::zero(), Vec3::zero())
     }
 
     #[inline(always)]
-    pub(super) fn first_turn<T: Real>(&self, state: &State<T>) -> (Mat3<T>, Turn<T>) {
+    pub(super) fn first_turn<T: Real>(&self, state: &LegState<T>) -> (Mat3<T>, LegRotation<T>) {
         (state.frame.axes, state.turn)
     }
 
     #[inline(always)]
-    pub(super) fn own_force<T: Real>(&self, _: &Body, _: Vec3<T>, _: &State<T>) -> T {
+    pub(super) fn own_force<T: Real>(&self, _: &Body, _: Vec3<T>, _: &LegState<T>) -> T {
         T::zero()
     }
 
