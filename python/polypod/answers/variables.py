@@ -13,7 +13,7 @@ from polypod.answers.mobility import Mobility
 from polypod.answers.parts import Joint, Limit
 from polypod.answers.singularity_kind import SingularityKind
 from polypod.answers.status import Status
-from polypod.files.units import coordinate_unit
+from polypod.files.units import coordinate_unit, si_unit
 from polypod.legs.drive import Drive
 from polypod.legs.drives import kinds_among
 
@@ -271,9 +271,22 @@ def variable(name: str) -> Variable:
     return Variable(_ONE, coordinate_unit(base) + per, symbol, f"{before}coordinate {base}")
 
 
+_OF_DRIVES = {
+    "length": ("coordinate_kind", ""),
+    "rate": ("coordinate_kind", "/s"),
+    "leg_acceleration": ("coordinate_kind", "/s^2"),
+    "force": ("force_kind", ""),
+}
+"""Variables whose unit is that of the drives' coordinates or forces, and what that is divided by."""
+
+
 def attributes_of(name: str, about: Variable, drives: Sequence[Drive]) -> dict[str, Any]:
     """Those of a variable of a dataset of a mechanism with these drives; some have other names for it."""
     found, kinds = about.attributes, kinds_among(drives)
+    if name in _OF_DRIVES:
+        quantity, per = _OF_DRIVES[name]
+        units = (si_unit(getattr(drive, quantity)) + per for drive in kinds)
+        found |= {"units": " or ".join(dict.fromkeys(units))}
     own = [drive.variables[name] for drive in kinds if name in drive.variables]
     if not own:
         return found
