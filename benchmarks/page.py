@@ -212,8 +212,9 @@ def actuation_table(results):
 def start_table(results):
     found = results["start"]
     rows = [(f"`{row['what']}`", f"{time(1e9 * row['median'])}", spread_of(row)) for row in found["commands"]]
-    build = found["build"]
-    rows.append((f"{build['what']}, {build['cores']} cores", time(1e9 * build["seconds"]), ""))
+    if "build" in found:
+        build = found["build"]
+        rows.append((f"{build['what']}, {build['cores']} cores", time(1e9 * build["seconds"]), ""))
     return table(("", "time", "quartiles"), rows)
 
 
