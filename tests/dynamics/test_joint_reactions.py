@@ -447,7 +447,7 @@ def test_reactions_are_linear_in_the_load():
 def test_solutions_hold_reactions_if_asked(tmp_path, monkeypatch):
     mech = pp.load("lu-3spu-2rpu-r")
     motion = pp.load_motion("lu-3spu-2rpu-r", mech).sample(np.linspace(0.0, 1.0, 7))
-    monkeypatch.setattr("polypod.solution.CHUNK", 4)
+    monkeypatch.setattr("polypod.solution.solve.CHUNK", 4)
     plain_dataset = pp.solve(mech, motion).dataset
     solution = pp.solve(mech, motion, reactions=True)
     dataset = solution.dataset

@@ -272,7 +272,7 @@ def test_a_file_that_is_no_toml_is_named_with_the_line(tmp_path: Path) -> None:
 def test_a_file_that_is_no_utf_8_is_named(tmp_path: Path) -> None:
     path = tmp_path / "bad.toml"
     path.write_bytes('name = "Kräfte"\n'.encode("latin-1"))
-    with pytest.raises(MechanismError, match=r"toml: is not UTF-8 text: .*0xe4 in position 10") as caught:
+    with pytest.raises(MechanismError, match=r"file: is not UTF-8 text: .*0xe4 in position 10") as caught:
         pp.load(path)
     assert str(path) in str(caught.value)
 
