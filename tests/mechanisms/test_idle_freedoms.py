@@ -106,7 +106,7 @@ def test_the_line_is_that_of_the_joints(name: str) -> None:
     along = np.array(idle.axis)
     assert abs(np.linalg.norm(along) - 1.0) < 1e-12
     assert abs(np.cross(joints - idle.point, along)).max() < 1e-9
-    assert "felt by no leg" in str(idle)
+    assert "moves no leg" in str(idle)
 
 
 @each
