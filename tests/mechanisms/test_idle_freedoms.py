@@ -184,7 +184,7 @@ def test_info_names_the_line(run) -> None:
     status, out, err = run("info", "pentapod-5-ups")
     assert (status, err) == (0, "")
     words = " ".join(out.replace("│", " ").split())
-    for said in ("one of them idle", "spin about the line", "felt by no leg"):
+    for said in ("one of them idle", "spin about the line", "which move no leg"):
         assert said in words
 
 

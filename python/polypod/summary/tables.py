@@ -105,7 +105,7 @@ def _idle(freedoms: Sequence[Mapping[str, Any]]) -> str:
         f"({row['body']} axes)"
         for row in freedoms
     ]
-    return f"{count} idle: {'; '.join(lines)}, felt by no leg"
+    return f"{count} idle: {'; '.join(lines)}, which move no leg"
 
 
 def _triple(vector: Sequence[float], factor: float = 1.0) -> str:

@@ -318,7 +318,11 @@ impl<const N: usize> Rows<'_, N> {
 /// The fields of a table, in order.
 #[inline(always)]
 pub(super) fn fields<const N: usize>() -> [FieldId; N] {
-    std::array::from_fn(FieldId)
+    let mut fields = [FieldId(0); N];
+    for k in 0..N {
+        fields[k] = FieldId(k);
+    }
+    fields
 }
 
 /// A table whose parts have each been worked on; work must write every number.
@@ -392,11 +396,11 @@ impl<O: Working<N>, const N: usize> Task for (&O, Part<'_, N>) {
     #[inline(always)]
     fn run<V: Lanes>(self) {
         let (operation, part) = self;
-        let mut count = 0;
-        let starts = part.widths.map(|width| {
-            count += width;
-            count - width
-        });
+        let (mut count, mut starts) = (0, [0; N]);
+        for k in 0..N {
+            starts[k] = count;
+            count += part.widths[k];
+        }
         let (mut rows, mut room) = (vec![Line([0.0; WIDTH]); count], operation.room::<V>());
         let streamed = if part.states * count < STREAMED { 0 } else { count * WIDTH };
         let mut staged = vec![MaybeUninit::uninit(); streamed];
@@ -441,16 +445,9 @@ fn copy<V: Lanes>(
         V::scatter(rows, staged);
         return streaming_stores::copy(&staged[..numbers], &mut to[..numbers]);
     }
-    for (lane, (answered, places)) in answered.iter().zip(to.chunks_exact_mut(rows.len().max(1))).enumerate()
-    {
-        if *answered {
-            for (place, row) in places.iter_mut().zip(rows) {
-                place.write(row.0[lane]);
-            }
-        } else {
-            for place in places {
-                place.write(f64::NAN);
-            }
+    for lane in 0..answered.len() {
+        for k in 0..rows.len() {
+            to[lane * rows.len() + k].write(if answered[lane] { rows[k].0[lane] } else { f64::NAN });
         }
     }
 }

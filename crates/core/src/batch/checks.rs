@@ -268,11 +268,12 @@ pub(super) fn solved<V: Lanes>(mech: &Mechanism, solution: &[V], pivots: V, code
 
 /// One number of each actuated leg, of as many as there are legs.
 #[inline(always)]
-pub(super) fn read_actuated<V: Lanes>(mech: &Mechanism, values: &[f64], at: At, read: &mut Vec<V>) {
-    read.clear();
+pub(super) fn read_actuated<V: Lanes>(mech: &Mechanism, values: &[f64], at: At, read: &mut [V]) {
+    let mut count = 0;
     for k in 0..mech.legs.len() {
         if mech.legs[k].actuated {
-            read.push(at.read_one(values, mech.legs.len(), k));
+            read[count] = at.read_one(values, mech.legs.len(), k);
+            count += 1;
         }
     }
 }

@@ -10,8 +10,9 @@ use crate::kinematics::coordinate_sets::{
 };
 use crate::model::mechanism::Mechanism;
 use crate::model::status::Status;
-use crate::number::lanes::{Lanes, work};
+use crate::number::lanes::Lanes;
 use crate::number::real::{Jet, Mask, Real};
+use crate::number::work::work;
 use crate::spatial::Motion;
 
 /// Given coordinates of the states with their rates and second rates: `given[k]` holds the three series of the
@@ -178,12 +179,12 @@ impl Operation<6> for FromCoordinates<'_> {
 
 // Parts of the solution, each a function of its own.
 work! {
-    Complete<'a, V> { mech: &'a Mechanism, set: &'a Set, q: &'a mut Values<Jet<V>>, branch: f64 } -> Conditions<V> {
+    Complete<'a, V: Lanes> { mech: &'a Mechanism, set: &'a Set, q: &'a mut Values<Jet<V>>, branch: f64 } -> Conditions<V> {
         coordinate_sets::complete(mech, set, q, branch)
     }
 }
 work! {
-    SolveDependent<'a, V> {
+    SolveDependent<'a, V: Lanes> {
         mech: &'a Mechanism,
         set: &'a Set,
         q: &'a mut Values<Jet<V>>,
@@ -195,7 +196,7 @@ work! {
     }
 }
 work! {
-    MotionOf<'a, V> { mech: &'a Mechanism, set: &'a Set, q: &'a Values<Jet<V>> } -> Motion<V> {
+    MotionOf<'a, V: Lanes> { mech: &'a Mechanism, set: &'a Set, q: &'a Values<Jet<V>> } -> Motion<V> {
         coordinate_sets::motion(&set.pose(mech, q))
     }
 }

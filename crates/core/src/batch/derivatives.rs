@@ -4,7 +4,9 @@ use super::block::{self, Answers, At, Codes, Working};
 use super::checks::{solved, within_limits};
 use super::{FieldId, Loads, States, Table};
 use crate::assembly::geometric_parameters;
-use crate::dynamics::derivatives::{self, DIRECTIONS, SolvedDynamics, Varied, VariedCoordinates};
+use crate::dynamics::derivatives::{
+    ByGeometry, ByMotion, DIRECTIONS, SolvedDynamics, Varied, VariedCoordinates,
+};
 use crate::dynamics::force_balance::UnitForceResponse;
 use crate::dynamics::inverse_dynamics::resultant;
 use crate::dynamics::regressor::{self, Regressor};
@@ -13,7 +15,9 @@ use crate::kinematics::leg;
 use crate::kinematics::rows::RowNumbers;
 use crate::model::mechanism::Mechanism;
 use crate::model::status::Status;
-use crate::number::lanes::{Lanes, work};
+use crate::number::lanes::Lanes;
+use crate::number::slices;
+use crate::number::work::work;
 use crate::spatial::{Motion, Wrench};
 
 /// A field for the forces of all legs and one for the multipliers.
@@ -127,7 +131,7 @@ impl Working<17> for Derivatives<'_> {
         let (mech, ids) = (self.mech, Answers::<17>::fields());
         let Room { response, forces, legs, by_motion, by_bodies, column, off, lengths } = room;
         let (state, codes) = solve(mech, self.states, self.loads, at, response, forces);
-        derivatives::by_motion(mech, &state, off, by_motion);
+        V::apart(ByMotion { mech, at: &state, off, columns: by_motion });
         for (k, column) in by_motion.chunks_exact(state.forces.len()).enumerate() {
             put(mech, answers, pair(&ids, k / 6), 6, k % 6, column);
         }
@@ -150,9 +154,10 @@ impl Working<17> for Derivatives<'_> {
         for k in 0..self.parameters {
             match &self.varied {
                 Some(varied) => {
-                    derivatives::by_geometry(&varied[k], &state, &by, by_motion, off, column, lengths);
+                    let (varied, at, coordinates) = (&varied[k], &state, &by);
+                    V::apart(ByGeometry { varied, at, coordinates, by_motion, off, column, lengths });
                 }
-                None => column.fill(V::lit(f64::NAN)),
+                None => slices::fill(column, V::lit(f64::NAN)),
             }
             sum = add(add(sum, column), lengths);
             put(mech, answers, pair(&ids, 7), self.parameters, k, column);
@@ -195,9 +200,7 @@ impl Derivatives<'_> {
         let (mech, count) = (self.mech, self.regressor.parameters.len());
         set_legs(mech, state, legs);
         for (k, unit) in columns.chunks_exact_mut(column.len()).enumerate() {
-            let wrench =
-                V::apart(UnitWrench { regressor: &self.regressor, mech, platform: &state.platform, legs, k });
-            state.response.put(wrench, &[], unit);
+            V::apart(UnitColumn { regressor: &self.regressor, mech, state, legs, k, column: unit });
         }
         for k in 0..count {
             self.regressor.put_by_bodies(columns, k, column);
@@ -257,8 +260,7 @@ impl Working<4> for Regressors<'_> {
         set_legs(mech, &state, legs);
         let (platform, width) = (&state.platform, self.regressor.parameters.len());
         for k in 0..width {
-            let wrench = V::apart(UnitWrench { regressor: &self.regressor, mech, platform, legs, k });
-            state.response.put(wrench, &[], column);
+            V::apart(UnitColumn { regressor: &self.regressor, mech, state: &state, legs, k, column });
             put(mech, answers, [y, y_constraint], width, k, column);
         }
         let load = self.loads.of(mech, &platform.pose, at);
@@ -292,7 +294,7 @@ fn set_legs<V: Lanes>(mech: &Mechanism, state: &SolvedDynamics<V>, legs: &mut Ve
 }
 
 work! {
-    SetLegs<'a, V> { mech: &'a Mechanism, platform: &'a Motion<V>, legs: &'a mut Vec<leg::LegState<V>> } -> () {
+    SetLegs<'a, V: Lanes> { mech: &'a Mechanism, platform: &'a Motion<V>, legs: &'a mut Vec<leg::LegState<V>> } -> () {
         legs.clear();
         for leg in &mech.legs {
             legs.push(leg::state(leg, platform));
@@ -301,21 +303,22 @@ work! {
 }
 
 work! {
-    Resultant<'a, V> { mech: &'a Mechanism, platform: &'a Motion<V>, load: Wrench<V> } -> Wrench<V> {
+    Resultant<'a, V: Lanes> { mech: &'a Mechanism, platform: &'a Motion<V>, load: Wrench<V> } -> Wrench<V> {
         resultant(mech, platform, load)
     }
 }
 
 work! {
-    /// Wrench on the platform of a unit of the k-th parameter.
-    UnitWrench<'a, V> {
+    /// Forces and multipliers for a unit of the k-th parameter.
+    UnitColumn<'a, 'b, V: Lanes> {
         regressor: &'a Regressor,
         mech: &'a Mechanism,
-        platform: &'a Motion<V>,
+        state: &'a SolvedDynamics<'b, V>,
         legs: &'a [leg::LegState<V>],
         k: usize,
-    } -> Wrench<V> {
-        regressor.wrench(mech, platform, legs, k)
+        column: &'a mut [V],
+    } -> () {
+        state.response.put(regressor.wrench(mech, &state.platform, legs, k), &[], column);
     }
 }
 

@@ -16,6 +16,7 @@ use crate::model::spec::Axes;
 use crate::model::status::Status;
 use crate::number::lanes::Lanes;
 use crate::number::real::Dual;
+use crate::number::work::work;
 use crate::spatial::{Motion, Pose, Twist, Vec3, Wrench};
 
 /// The loads of the states: the mechanism's own, or six numbers for each.
@@ -96,6 +97,7 @@ impl Working<3> for InverseDynamics<'_> {
             .then(with_motion(mech, &platform, legs))
             .unless(finite(&load.array()), Status::InvalidInput);
         if let Some(preferred) = self.preferred {
+            room.preferred.resize(mech.actuated().count(), V::zero());
             read_actuated(mech, preferred, at, &mut room.preferred);
             codes = codes.unless(finite(&room.preferred), Status::InvalidInput);
         }
@@ -212,7 +214,7 @@ impl Working<9> for Power<'_> {
         let (mech, ids) = (self.mech, Answers::<9>::fields());
         let (platform, wrench, codes) = self.states.loaded_at::<V>(mech, self.loads, at);
         let Motion { pose, twist, .. } = &platform;
-        let (kinetic, potential) = energy_along(mech, &platform);
+        let (kinetic, potential) = V::apart(EnergyAlong { mech, platform: &platform });
         let load = wrench.power(twist);
         let damping = inverse_dynamics::damping_wrench(mech, twist).power(twist);
         let regular = room.solve_motion(mech, &platform, wrench);
@@ -237,11 +239,12 @@ impl Working<9> for Power<'_> {
     }
 }
 
-/// Kinetic and potential energy as duals along the motion.
-#[inline(always)]
-fn energy_along<V: Lanes>(mech: &Mechanism, platform: &Motion<V>) -> (Dual<V>, Dual<V>) {
-    let Motion { pose, twist, acceleration } = platform;
-    let moving = pose.along(twist);
-    let twist = Twist::new(twist.v.with_rate(acceleration.a), twist.omega.with_rate(acceleration.eps));
-    inverse_dynamics::energy(mech, &moving, &twist)
+work! {
+    /// Kinetic and potential energy as duals along the motion.
+    EnergyAlong<'a, V: Lanes> { mech: &'a Mechanism, platform: &'a Motion<V> } -> (Dual<V>, Dual<V>) {
+        let Motion { pose, twist, acceleration } = platform;
+        let moving = pose.along(twist);
+        let twist = Twist::new(twist.v.with_rate(acceleration.a), twist.omega.with_rate(acceleration.eps));
+        inverse_dynamics::energy(mech, &moving, &twist)
+    }
 }

@@ -12,6 +12,7 @@ use crate::limits::margins::LegCache;
 use crate::model::mechanism::Mechanism;
 use crate::model::status::Status;
 use crate::number::lanes::{self, Lanes, Row, Task, WIDTH};
+use crate::number::slices::pairs;
 use crate::spatial::Pose;
 use crate::spatial::packed_poses::{Poses, load, put};
 
@@ -163,7 +164,7 @@ impl Task for Checks<'_> {
                 many.resize(self.numbers.len(), LegTarget::none());
                 &mut many[..]
             };
-            for ((target, row), (_, leg)) in asked.iter_mut().zip(self.numbers).zip(mech.actuated()) {
+            for ((target, row), (_, leg)) in pairs(pairs(&mut *asked, self.numbers), mech.actuated()) {
                 *target = LegTarget::of(leg, V::load(&row[k..]));
             }
             check(mech, asked, &pose).store(&mut self.codes[k..]);

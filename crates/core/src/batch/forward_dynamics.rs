@@ -50,7 +50,7 @@ impl Working<2> for ForwardDynamics<'_> {
     type Room<V: Lanes> = Vec<V>;
 
     fn room<V: Lanes>(&self) -> Vec<V> {
-        Vec::with_capacity(self.mech.legs.len())
+        vec![V::zero(); self.mech.actuated().count()]
     }
 
     #[inline(always)]

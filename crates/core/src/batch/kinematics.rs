@@ -15,6 +15,7 @@ use crate::model::limit::Zero;
 use crate::model::mechanism::Mechanism;
 use crate::model::status::Status;
 use crate::number::lanes::Lanes;
+use crate::number::slices::pairs;
 use crate::spatial::{Twist, Vec3};
 
 /// Lengths, vectors r and directions δ of all legs [Eq. 3].
@@ -142,7 +143,7 @@ impl Operation<21> for Kinematics<'_> {
         let mech = self.mech;
         let (platform, codes) = self.states.platform(at);
         let (mut legs, mut seen) = (Codes::ok(), LegCache::default());
-        for (k, (leg, zero)) in mech.legs.iter().zip(self.zeros).enumerate() {
+        for (k, (leg, zero)) in pairs(&mech.legs, self.zeros).enumerate() {
             let state = leg::state(leg, &platform);
             let leg::LegState { position: p, end, turn, frame } = &state;
             legs = with_leg(mech, leg, p, frame.sine * frame.sine, legs);

@@ -12,8 +12,10 @@ use crate::kinematics::leg;
 use crate::kinematics::rows::{Row, RowNumbers, for_each_row};
 use crate::model::mechanism::{Leg, Mechanism};
 use crate::model::spec::Axes;
-use crate::number::lanes::{Lanes, Work, work};
+use crate::number::lanes::Lanes;
 use crate::number::real::{Constant, Dual, Jet, Real};
+use crate::number::slices::{self, pairs};
+use crate::number::work::work;
 use crate::spatial::{Acceleration, Motion, Pose, Twist, Vec3, Wrench};
 
 /// Numbers that a motion is varied in: six of the pose (o moves, and the platform rotates about axes of the
@@ -46,7 +48,7 @@ impl<'a, 'b, V: Lanes> Imbalance<'a, 'b, V> {
     /// `rows` is room for a number of each row where actuators are redundant, else empty.
     #[inline(always)]
     fn new(at: &'a SolvedDynamics<'a, V>, wrench: Wrench<Dual<V>>, rows: &'b mut [V]) -> Self {
-        rows.fill(V::zero());
+        slices::fill(rows, V::zero());
         let motion = Twist::new(at.motion.v.with_rate(Vec3::zero()), at.motion.omega.with_rate(Vec3::zero()));
         Imbalance { at, wrench, motion, rows }
     }
@@ -60,15 +62,18 @@ impl<'a, 'b, V: Lanes> Imbalance<'a, 'b, V> {
         varied: &Motion<Dual<V>>,
         row: &mut usize,
     ) {
-        let force = if mech.legs[index].actuated { self.at.forces[*row] } else { V::zero() };
-        let (sum, off) = V::apart(VariedLeg { mech, index, varied, force, motion: &self.motion });
-        self.wrench = self.wrench + sum;
-        if mech.legs[index].actuated {
-            if let Some(at) = self.rows.get_mut(*row) {
-                *at = off;
+        let leg = &mech.legs[index];
+        let place = leg::place(leg, &varied.pose);
+        let mut sum = leg_wrench(mech, index, leg, &place, varied);
+        if leg.actuated {
+            let unit = leg::row(leg, &place.0);
+            sum = sum + unit * Dual::new(self.at.forces[*row], V::zero());
+            if let Some(off) = self.rows.get_mut(*row) {
+                *off = unit.power(&self.motion).d;
             }
             *row += 1;
         }
+        self.wrench = self.wrench + sum;
     }
 
     /// Adds what a local degree of freedom's or a constraint's row does, its multiplier kept.
@@ -88,58 +93,33 @@ impl<'a, 'b, V: Lanes> Imbalance<'a, 'b, V> {
     }
 }
 
-/// A leg's own wrench with that of its active force, as they vary, and what its row then does to y.
-struct VariedLeg<'a, S, V: Real> {
-    mech: &'a Mechanism<S>,
-    index: usize,
-    varied: &'a Motion<Dual<V>>,
-    force: V,
-    motion: &'a Twist<Dual<V>>,
-}
-
-impl<S: Constant<Dual<V>>, V: Lanes> Work<V> for VariedLeg<'_, S, V> {
-    type Result = (Wrench<Dual<V>>, V);
-
-    #[inline(always)]
-    fn run(self) -> (Wrench<Dual<V>>, V) {
-        let VariedLeg { mech, index, varied, force, motion } = self;
-        let leg = &mech.legs[index];
-        let place = leg::place(leg, &varied.pose);
-        let own = leg_wrench(mech, index, leg, &place, varied);
-        if !leg.actuated {
-            return (own, V::zero());
+work! {
+    /// Derivatives of active forces and multipliers by the motion in each direction, the other numbers kept: one column for each
+    /// direction. `off` is room for a number of each row where actuators are redundant, else empty.
+    pub(crate) ByMotion<'a, 'b, V: Lanes> {
+        mech: &'a Mechanism,
+        at: &'a SolvedDynamics<'b, V>,
+        off: &'a mut [V],
+        columns: &'a mut [V],
+    } -> () {
+        let width = mech.rows();
+        for direction in 0..DIRECTIONS {
+            let mut step = [V::zero(); DIRECTIONS];
+            step[direction] = V::one();
+            let varied = along(&at.platform, &step);
+            let (load, axes) = at.load;
+            let load = Wrench::new(load.force.with_rate(Vec3::zero()), load.torque.with_rate(Vec3::zero()));
+            let own = own_wrench(mech, &varied, load_in_base(load, axes, &varied.pose));
+            let mut imbalance = Imbalance::new(at, own, off);
+            let mut row = 0;
+            for i in 0..mech.legs.len() {
+                imbalance.add_leg(mech, i, &varied, &mut row);
+            }
+            for_each_row!(others of mech, at.numbers.actuated().end, |number, other| {
+                imbalance.add_row(other, number, &varied.pose);
+            });
+            imbalance.put(&mut columns[direction * width..(direction + 1) * width]);
         }
-        let unit = leg::row(leg, &place.0);
-        (own + unit * Dual::new(force, V::zero()), unit.power(motion).d)
-    }
-}
-
-/// Derivatives of active forces and multipliers by the motion in each direction, the other numbers kept: one column for each
-/// direction. `off` is room for a number of each row where actuators are redundant, else empty.
-#[inline(always)]
-pub(crate) fn by_motion<V: Lanes>(
-    mech: &Mechanism,
-    at: &SolvedDynamics<V>,
-    off: &mut [V],
-    columns: &mut [V],
-) {
-    let width = mech.rows();
-    for direction in 0..DIRECTIONS {
-        let mut step = [V::zero(); DIRECTIONS];
-        step[direction] = V::one();
-        let varied = along(&at.platform, &step);
-        let (load, axes) = at.load;
-        let load = Wrench::new(load.force.with_rate(Vec3::zero()), load.torque.with_rate(Vec3::zero()));
-        let own = own_wrench(mech, &varied, load_in_base(load, axes, &varied.pose));
-        let mut imbalance = Imbalance::new(at, own, off);
-        let mut row = 0;
-        for i in 0..mech.legs.len() {
-            imbalance.add_leg(mech, i, &varied, &mut row);
-        }
-        for_each_row!(others of mech, at.numbers.actuated().end, |number, other| {
-            imbalance.add_row(other, number, &varied.pose);
-        });
-        imbalance.put(&mut columns[direction * width..(direction + 1) * width]);
     }
 }
 
@@ -210,14 +190,26 @@ pub(crate) fn rate<V: Lanes>(w: Wrench<Dual<V>>) -> Wrench<V> {
     Wrench::new(rate_of(w.force), rate_of(w.torque))
 }
 
-/// A row of the derivative along a step, from the columns by motion of `width` rows each.
+/// Rows summed at the same time: a sum waits for its last term, six of them keep the processor busy.
+const TOGETHER: usize = 6;
+
+/// Adds the derivative along a step, from the columns by motion, to a column.
 #[inline(always)]
-fn along_step<V: Lanes>(by_motion: &[V], width: usize, row: usize, step: &[V; DIRECTIONS]) -> V {
-    let mut sum = V::zero();
-    for k in 0..DIRECTIONS {
-        sum = by_motion[k * width + row].mul_add(step[k], sum);
+fn add_along<V: Lanes>(by_motion: &[V], step: &[V; DIRECTIONS], column: &mut [V]) {
+    let width = column.len();
+    for first in (0..width).step_by(TOGETHER) {
+        let mut sums = [V::zero(); TOGETHER];
+        for k in 0..DIRECTIONS {
+            // The last rows, again, where there are fewer.
+            let from = &by_motion[k * width + first.min(width - TOGETHER)..][..TOGETHER];
+            for i in 0..TOGETHER {
+                sums[i] = from[i].mul_add(step[k], sums[i]);
+            }
+        }
+        for row in first..width.min(first + TOGETHER) {
+            column[row] = column[row] + sums[row - first.min(width - TOGETHER)];
+        }
     }
-    sum
 }
 
 /// The coordinates at a state, and how the motion follows them.
@@ -256,10 +248,8 @@ impl<V: Lanes> VariedCoordinates<V> {
         order: usize,
         column: &mut [V],
     ) {
-        let (step, width) = (self.step(varied, order), column.len());
-        for (row, x) in column.iter_mut().enumerate() {
-            *x = along_step(by_motion, width, row, &step);
-        }
+        slices::fill(column, V::zero());
+        add_along(by_motion, &self.step(varied, order), column);
     }
 
     /// Variation of the motion, with the dependent coordinates.
@@ -280,7 +270,7 @@ impl<V: Lanes> VariedCoordinates<V> {
 }
 
 work! {
-    CoordinatesAt<'a, V> {
+    CoordinatesAt<'a, V: Lanes> {
         mech: &'a Mechanism,
         set: &'a Set,
         still: &'a Varied,
@@ -337,47 +327,45 @@ impl Varied {
     }
 }
 
-/// Derivatives of active forces, multipliers and of the lengths of all legs by a number of the geometry, the given
-/// coordinates, their rates and second rates kept and dependent coordinates following. `off` as in [`by_motion`].
-#[inline(always)]
-pub(crate) fn by_geometry<V: Lanes>(
-    varied: &Varied,
-    at: &SolvedDynamics<V>,
-    coordinates: &VariedCoordinates<V>,
-    by_motion: &[V],
-    off: &mut [V],
-    column: &mut [V],
-    lengths: &mut [V],
-) {
-    let Varied { mech, legs, constraints, moves, .. } = varied;
-    // With the motion kept only some legs vary, and the rods that they lead.
-    let still = along(&at.platform, &[V::zero(); DIRECTIONS]);
-    let mut imbalance = Imbalance::new(at, Wrench::zero(), off);
-    for &i in legs {
-        let mut row = 0;
-        for other in 0..i {
-            row += usize::from(mech.legs[other].actuated);
+work! {
+    /// Derivatives of active forces, multipliers and of the lengths of all legs by a number of the geometry, the given
+    /// coordinates, their rates and second rates kept and dependent coordinates following. `off` as in [`ByMotion`].
+    pub(crate) ByGeometry<'a, 'b, V: Lanes> {
+        varied: &'a Varied,
+        at: &'a SolvedDynamics<'b, V>,
+        coordinates: &'a VariedCoordinates<V>,
+        by_motion: &'a [V],
+        off: &'a mut [V],
+        column: &'a mut [V],
+        lengths: &'a mut [V],
+    } -> () {
+        let Varied { mech, legs, constraints, moves, .. } = varied;
+        // With the motion kept only some legs vary, and the rods that they lead.
+        let still = along(&at.platform, &[V::zero(); DIRECTIONS]);
+        let mut imbalance = Imbalance::new(at, Wrench::zero(), off);
+        for &i in legs {
+            let mut row = 0;
+            for other in 0..i {
+                row += usize::from(mech.legs[other].actuated);
+            }
+            imbalance.add_leg(mech, i, &still, &mut row);
         }
-        imbalance.add_leg(mech, i, &still, &mut row);
-    }
-    for (idle, number) in mech.idle.iter().zip(at.numbers.idle()) {
-        imbalance.add_row(Row::Idle(idle), number, &still.pose);
-    }
-    for &k in constraints {
-        let number = at.numbers.constraints().start + k;
-        imbalance.add_row(Row::Constraint(&mech.independent[k]), number, &still.pose);
-    }
-    imbalance.put(column);
-    let mut step = [V::zero(); DIRECTIONS];
-    if *moves {
-        step = coordinates.following_geometry(varied);
-        let width = column.len();
-        for (row, x) in column.iter_mut().enumerate() {
-            *x = *x + along_step(by_motion, width, row, &step);
+        for (idle, number) in pairs(&mech.idle, at.numbers.idle()) {
+            imbalance.add_row(Row::Idle(idle), number, &still.pose);
         }
-    }
-    let moving = along(&at.platform, &step);
-    for (i, leg) in mech.legs.iter().enumerate() {
-        lengths[i] = leg::position(leg, &moving.pose).coordinate.d;
+        for &k in constraints {
+            let number = at.numbers.constraints().start + k;
+            imbalance.add_row(Row::Constraint(&mech.independent[k]), number, &still.pose);
+        }
+        imbalance.put(column);
+        let mut step = [V::zero(); DIRECTIONS];
+        if *moves {
+            step = coordinates.following_geometry(varied);
+            add_along(by_motion, &step, column);
+        }
+        let moving = along(&at.platform, &step);
+        for (i, leg) in mech.legs.iter().enumerate() {
+            lengths[i] = leg::position(leg, &moving.pose).coordinate.d;
+        }
     }
 }

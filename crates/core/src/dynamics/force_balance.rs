@@ -6,7 +6,9 @@ use crate::kinematics::jacobian::scaled_jacobian;
 use crate::kinematics::redundant_rows::RedundantRows;
 use crate::kinematics::rows::{Matrix6, RowNumbers};
 use crate::model::mechanism::Mechanism;
-use crate::number::lanes::{Lanes, work};
+use crate::number::lanes::Lanes;
+use crate::number::slices::{self, pairs};
+use crate::number::work::work;
 use crate::numerics::gauss::{Solved, solve_all};
 use crate::spatial::{Motion, Pose, Twist, Wrench};
 
@@ -38,7 +40,7 @@ impl<V: Lanes> ForceSolver<V> {
         match &mut self.redundant {
             None => {
                 let (forces, pivots) = balance.solved(mech, pose);
-                self.forces.copy_from_slice(&forces);
+                slices::copy(&forces, &mut self.forces[..6]);
                 pivots
             }
             Some(rows) => {
@@ -53,7 +55,8 @@ impl<V: Lanes> ForceSolver<V> {
     /// The same for a motion under load.
     #[inline(always)]
     pub fn solve_motion(&mut self, mech: &Mechanism, platform: &Motion<V>, load: Wrench<V>) -> V {
-        self.solve(mech, &platform.pose, Balance::of(mech, platform, load))
+        let balance = V::apart(BalanceOf { mech, platform, load });
+        self.solve(mech, &platform.pose, balance)
     }
 
     /// Twists that are free to move under given forces of all actuators, where these are redundant \[T46\].
@@ -65,19 +68,27 @@ impl<V: Lanes> ForceSolver<V> {
     }
 }
 
+work! {
+    BalanceOf<'a, V: Lanes> { mech: &'a Mechanism, platform: &'a Motion<V>, load: Wrench<V> } -> Balance<V> {
+        Balance::of(mech, platform, load)
+    }
+}
+
 /// Forces and multipliers that balance a unit of each force and torque on the platform \[T15\]; where actuators are
 /// redundant also those for a unit that each row of J is off by \[T74\].
 pub struct UnitForceResponse<V> {
-    rows: usize,
-    /// One column of all rows after the other.
+    /// The columns, where J is square.
+    square: Matrix6<V>,
+    /// Where it is not: one column of all rows after the other.
     columns: Vec<V>,
+    rows: usize,
     pub regular: V,
     redundant: Option<RedundantRows<V>>,
 }
 
 work! {
     /// The columns where J is square.
-    UnitForces<'a, V> { mech: &'a Mechanism, pose: &'a Pose<V> } -> Solved<V, Matrix6<V>> {
+    UnitForces<'a, V: Lanes> { mech: &'a Mechanism, pose: &'a Pose<V> } -> Solved<V, Matrix6<V>> {
         let inverse = V::lit(1.0 / mech.characteristic_length);
         let mut rhs = [[V::zero(); 6]; 6];
         for k in 0..6 {
@@ -92,10 +103,11 @@ impl<V: Lanes> UnitForceResponse<V> {
     #[must_use]
     pub fn new(mech: &Mechanism) -> Self {
         let rows = mech.rows();
-        let columns = if mech.is_redundant() { 6 + rows } else { 6 };
+        let columns = if mech.is_redundant() { 6 + rows } else { 0 };
         UnitForceResponse {
-            rows,
+            square: [[V::zero(); 6]; 6],
             columns: vec![V::zero(); rows * columns],
+            rows,
             regular: V::zero(),
             redundant: mech.is_redundant().then(|| RedundantRows::new(mech)),
         }
@@ -103,18 +115,13 @@ impl<V: Lanes> UnitForceResponse<V> {
 
     #[inline(always)]
     pub fn set(&mut self, mech: &Mechanism, pose: &Pose<V>) {
-        let columns = self.columns.chunks_exact_mut(self.rows);
         let Some(rows) = &mut self.redundant else {
-            let solved = V::apart(UnitForces { mech, pose });
-            for (column, x) in columns.zip(&solved.x) {
-                column.copy_from_slice(x);
-            }
-            self.regular = solved.pivots;
+            Solved { x: self.square, pivots: self.regular, .. } = V::apart(UnitForces { mech, pose });
             return;
         };
         rows.factor(mech, pose);
         self.regular = rows.regular;
-        for (k, column) in columns.enumerate() {
+        for (k, column) in self.columns.chunks_exact_mut(self.rows).enumerate() {
             rows.solve_unit(k);
             rows.put_forces(column);
         }
@@ -140,10 +147,20 @@ impl<V: Lanes> UnitForceResponse<V> {
     #[inline(always)]
     pub fn put(&self, w: Wrench<V>, off: &[V], forces: &mut [V]) {
         let w = w.array();
-        forces.fill(V::zero());
-        for (column, x) in self.columns.chunks_exact(self.rows).zip(w.iter().chain(off)) {
-            for (force, unit) in forces.iter_mut().zip(column) {
-                *force = unit.mul_add(*x, *force);
+        if self.redundant.is_none() {
+            let mut sum = [V::zero(); 6];
+            for k in 0..6 {
+                for i in 0..6 {
+                    sum[i] = self.square[k][i].mul_add(w[k], sum[i]);
+                }
+            }
+            return slices::copy(&sum, forces);
+        }
+        slices::fill(forces, V::zero());
+        for (k, column) in self.columns.chunks_exact(self.rows).take(6 + off.len()).enumerate() {
+            let x = if k < 6 { w[k] } else { off[k - 6] };
+            for (force, unit) in pairs(&mut *forces, column) {
+                *force = unit.mul_add(x, *force);
             }
         }
     }

@@ -9,9 +9,11 @@ use crate::kinematics::constraint;
 use crate::kinematics::coordinate_sets::{self, MAX_COORDINATES, Set, Values};
 use crate::kinematics::leg;
 use crate::kinematics::quadratic_forms::quadratic;
+use crate::kinematics::rows::Matrix6;
 use crate::model::mechanism::{MAX_CONSTRAINTS, Mechanism};
 use crate::model::status::Status;
 use crate::number::real::{Jet, Ordered, Real};
+use crate::number::work::work;
 use crate::numerics::gauss::{Solved, solve, solve_first};
 use crate::spatial::{Acceleration, Motion, Pose, Twist, Vec3, Wrench};
 
@@ -45,7 +47,7 @@ pub fn forward_dynamics<T: Real>(
     load: Wrench<T>,
 ) -> Driven<T> {
     let scale = mech.characteristic_length;
-    let mut push = resultant(mech, &coasting(pose, twist), load);
+    let mut push = T::apart(Coasting { mech, pose, twist, load });
     let mut count = 0;
     for leg in &mech.legs {
         if leg.actuated {
@@ -54,8 +56,9 @@ pub fn forward_dynamics<T: Real>(
         }
     }
     // All in pure numbers: rotations as arcs at Λ, masses by their mean, so that pivots compare.
-    let arcs: [f64; 6] = std::array::from_fn(|i| if i < 3 { 1.0 } else { 1.0 / scale });
-    let mass = mass_matrix(mech, pose);
+    let arc = 1.0 / scale;
+    let arcs = [1.0, 1.0, 1.0, arc, arc, arc];
+    let mass = T::apart(MassMatrix { mech, pose });
     let mut trace = T::zero();
     for i in 0..6 {
         trace = trace + mass[i][i].scale(arcs[i] * arcs[i]);
@@ -80,7 +83,8 @@ pub fn forward_dynamics<T: Real>(
         }
         rhs[6 + k] = -quadratic(&constraint::hessian(c, pose), &v).scale(size);
     }
-    let Solved { x: [x], pivots, .. } = solve_first(m, [rhs], 6 + mech.independent.len());
+    let Solved { x: [x], pivots, .. } =
+        T::apart(SolveDriven { m: &m, rhs: &rhs, count: 6 + mech.independent.len() });
     let (mut acceleration, mut multipliers) = ([T::zero(); 6], [T::zero(); MAX_CONSTRAINTS]);
     for i in 0..6 {
         acceleration[i] = x[i].scale(arcs[i]);
@@ -90,6 +94,32 @@ pub fn forward_dynamics<T: Real>(
         multipliers[k] = (x[6 + k] / unit).scale(constraint::length(c, scale));
     }
     Driven { acceleration: Acceleration::from_array(acceleration), multipliers, pivots }
+}
+
+work! {
+    MassMatrix<'a, T: Real> { mech: &'a Mechanism, pose: &'a Pose<T> } -> Matrix6<T> {
+        mass_matrix(mech, pose)
+    }
+}
+work! {
+    /// What the links take from the forces in a motion without acceleration.
+    Coasting<'a, T: Real> {
+        mech: &'a Mechanism,
+        pose: &'a Pose<T>,
+        twist: &'a Twist<T>,
+        load: Wrench<T>,
+    } -> Wrench<T> {
+        resultant(mech, &coasting(pose, twist), load)
+    }
+}
+work! {
+    SolveDriven<'a, T: Real> {
+        m: &'a [[T; UNKNOWNS]; UNKNOWNS],
+        rhs: &'a [T; UNKNOWNS],
+        count: usize,
+    } -> Solved<T, [[T; UNKNOWNS]; 1]> {
+        solve_first(*m, [*rhs], count)
+    }
 }
 
 #[inline(always)]

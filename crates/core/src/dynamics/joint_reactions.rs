@@ -10,6 +10,7 @@ use crate::kinematics::leg;
 use crate::model::joint::{JointKind, Normal};
 use crate::model::mechanism::{Body, ConstraintKind, Leg, Mechanism};
 use crate::number::real::Real;
+use crate::number::slices;
 use crate::spatial::{Mat3, Motion, Pose, Vec3, Wrench};
 
 /// A joint between two links.
@@ -268,7 +269,7 @@ pub(crate) fn put_unbalanced<T: Real>(
         let above = platform_joint(mech, i);
         sum = sum + reactions[above].moved(places[above].point - o);
     }
-    rows[count..].copy_from_slice(&pure(sum, length).array());
+    slices::copy(&pure(sum, length).array(), &mut rows[count..]);
 }
 
 /// Index of the platform joint of a leg.

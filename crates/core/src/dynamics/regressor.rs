@@ -6,6 +6,7 @@ use crate::dynamics::inverse_dynamics;
 use crate::kinematics::leg;
 use crate::model::mechanism::{Body, Leg, Mechanism, Turning};
 use crate::number::real::{Dual, Real};
+use crate::number::slices;
 use crate::spatial::{Mat3, Motion, Twist, Vec3, Wrench};
 
 /// A link that may have mass.
@@ -245,7 +246,7 @@ impl Regressor {
     #[inline(always)]
     pub(crate) fn put_by_bodies<T: Real>(&self, columns: &[T], k: usize, sum: &mut [T]) {
         let width = sum.len();
-        sum.fill(T::zero());
+        slices::fill(sum, T::zero());
         for &(column, factor) in &self.by_bodies[k] {
             for (row, x) in sum.iter_mut().enumerate() {
                 *x = *x + columns[column * width + row].scale(factor);

@@ -10,8 +10,10 @@ use crate::kinematics::idle;
 use crate::model::drive::Drive;
 use crate::model::joint::JointKind;
 use crate::model::mechanism::Mechanism;
-use crate::number::lanes::{Lanes, any, work};
+use crate::number::lanes::{Lanes, any};
 use crate::number::real::{Mask, Real};
+use crate::number::slices::{self, pairs};
+use crate::number::work::work;
 use crate::numerics::householder::Householder;
 use crate::spatial::{Motion, Pose, Vec3, Wrench};
 
@@ -246,17 +248,17 @@ impl<'a, V: Lanes> Solver<'a, V> {
         // freedom nothing to hold: what the props hold shows as an error.
         let regular = forces.solve_motion(mech, platform, load);
         let mut row = 0;
-        for (leg, balance) in mech.legs.iter().zip(&mut self.legs) {
+        for (leg, balance) in pairs(&mech.legs, &mut self.legs) {
             balance.push = if leg.actuated { forces.forces[row] } else { V::zero() };
             row += usize::from(leg.actuated);
         }
-        for (idle, torque) in mech.idle.iter().zip(&forces.forces[forces.numbers.idle()]) {
+        for (idle, torque) in pairs(&mech.idle, &forces.forces[forces.numbers.idle()]) {
             self.given.platform = self.given.platform + idle::row(idle, pose) * *torque;
         }
         let mut twists = [[V::zero(); 6]; 6];
         let count = self.props.len();
         forces.put_freedoms(&mut twists[..count]);
-        for (prop, twist) in self.props.iter_mut().zip(twists) {
+        for (prop, twist) in pairs(&mut self.props, twists) {
             *prop = Wrench::from_array(twist);
         }
         let holds = self.solve_given(pose);
@@ -291,7 +293,7 @@ impl<'a, V: Lanes> Solver<'a, V> {
             V::apart(PutReactions { mech, places, given, on_platform, all: stress });
         }
         V::apart(TurnStresses { choice: &mut self.choice, places: &self.places });
-        self.assumed.copy_from_slice(&self.least);
+        slices::copy(&self.least, &mut self.assumed);
         let (choice, places) = (&mut self.choice, &self.places);
         V::apart(MakeLeast { choice, places, couples_first: false, reactions: &mut self.least });
         let (choice, places) = (&mut self.choice, &self.places);
@@ -434,17 +436,17 @@ impl<'a, V: Lanes> Solver<'a, V> {
 
 // Parts of the solution, each a function of its own.
 work! {
-    SetGiven<'a, V> { given: &'a mut Given<V>, mech: &'a Mechanism, platform: &'a Motion<V>, load: Wrench<V> } -> () {
+    SetGiven<'a, V: Lanes> { given: &'a mut Given<V>, mech: &'a Mechanism, platform: &'a Motion<V>, load: Wrench<V> } -> () {
         given.set(mech, platform, load);
     }
 }
 work! {
-    SetPlaces<'a, V> { mech: &'a Mechanism, pose: &'a Pose<V>, places: &'a mut [JointFrame<V>] } -> () {
+    SetPlaces<'a, V: Lanes> { mech: &'a Mechanism, pose: &'a Pose<V>, places: &'a mut [JointFrame<V>] } -> () {
         put_places(mech, pose, places);
     }
 }
 work! {
-    SolveLeg<'a, V> {
+    SolveLeg<'a, V: Lanes> {
         leg: &'a mut LegBalance<V>,
         drive: Drive,
         places: &'a [JointFrame<V>],
@@ -456,7 +458,7 @@ work! {
 }
 work! {
     /// Puts the shares, and tells how regular the balances are.
-    SolveBalances<'a, 'b, V> { solver: &'a mut Solver<'b, V>, o: Vec3<V> } -> V {
+    SolveBalances<'a, 'b, V: Lanes> { solver: &'a mut Solver<'b, V>, o: Vec3<V> } -> V {
         solver.set_up(o);
         solver.system.factor();
         let regular = solver.system.reciprocal_condition();
@@ -465,7 +467,7 @@ work! {
     }
 }
 work! {
-    PutReactions<'a, V> {
+    PutReactions<'a, V: Lanes> {
         mech: &'a Mechanism,
         places: &'a [JointFrame<V>],
         given: &'a Given<V>,
@@ -476,17 +478,17 @@ work! {
     }
 }
 work! {
-    Holds<'a, 'b, V> { solver: &'a mut Solver<'b, V>, o: Vec3<V>, regular: V } -> Mask<V> {
+    Holds<'a, 'b, V: Lanes> { solver: &'a mut Solver<'b, V>, o: Vec3<V>, regular: V } -> Mask<V> {
         solver.holds(o, regular)
     }
 }
 work! {
-    TurnStresses<'a, V> { choice: &'a mut Choice<V>, places: &'a [JointFrame<V>] } -> () {
+    TurnStresses<'a, V: Lanes> { choice: &'a mut Choice<V>, places: &'a [JointFrame<V>] } -> () {
         choice.turn(places);
     }
 }
 work! {
-    MakeLeast<'a, V> {
+    MakeLeast<'a, V: Lanes> {
         choice: &'a mut Choice<V>,
         places: &'a [JointFrame<V>],
         couples_first: bool,
@@ -496,7 +498,7 @@ work! {
     }
 }
 work! {
-    PutDeterminate<'a, 'b, V> { solver: &'a mut Solver<'b, V> } -> () {
+    PutDeterminate<'a, 'b, V: Lanes> { solver: &'a mut Solver<'b, V> } -> () {
         solver.put_determinate();
     }
 }

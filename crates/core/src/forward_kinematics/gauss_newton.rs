@@ -15,6 +15,7 @@ use crate::mobility::degrees_of_freedom::RANK_TOLERANCE;
 use crate::model::mechanism::Mechanism;
 use crate::model::status::Status;
 use crate::number::lanes::{self, Lanes, Task, WIDTH};
+use crate::number::slices::pairs;
 use crate::numerics::svd::Svd;
 use crate::spatial::motion::pure_row;
 use crate::spatial::packed_poses::{Poses, load, put};
@@ -105,7 +106,7 @@ impl<V: Lanes> Misses<V> {
         let zero = V::zero();
         let mut found =
             Misses { legs: zero, others: zero, merit: zero, step, size: zero, left: zero, pivots };
-        for (row, miss) in errors.rows.iter().zip(&errors.legs) {
+        for (row, miss) in pairs(&errors.rows, &errors.legs) {
             let mut rest = *miss;
             for i in 0..6 {
                 rest = row[i].mul_add(step[i], rest);
@@ -324,8 +325,9 @@ impl Task for Evaluation<'_> {
             let found = Misses::by_reflections(mech, &pose, &errors, &mut rows);
             let numbers = [found.legs, found.others, found.merit, found.size, found.left, found.pivots];
             let mut stored = [[0.0; WIDTH]; 12];
-            for (row, x) in stored.iter_mut().zip(numbers.into_iter().chain(found.step)) {
-                x.store(row);
+            for i in 0..6 {
+                numbers[i].store(&mut stored[i]);
+                found.step[i].store(&mut stored[6 + i]);
             }
             for lane in 0..V::WIDTH {
                 let [legs, others, merit, size, left, pivots, step @ ..] = stored.map(|row| row[lane]);
@@ -357,7 +359,7 @@ impl Task for Residuals<'_> {
 /// Targets of the legs of the states from the k-th on.
 #[inline(always)]
 fn set_targets<V: Lanes>(mech: &Mechanism, numbers: &[lanes::Row], k: usize, targets: &mut [LegTarget<V>]) {
-    for ((target, numbers), (_, leg)) in targets.iter_mut().zip(numbers).zip(mech.actuated()) {
+    for ((target, numbers), (_, leg)) in pairs(pairs(targets, numbers), mech.actuated()) {
         *target = LegTarget::of(leg, V::load(&numbers[k..]));
     }
 }

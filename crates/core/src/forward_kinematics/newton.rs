@@ -160,8 +160,8 @@ pub fn are_coordinates(mech: &Mechanism, coordinates: &[f64]) -> bool {
 /// A solution (v/Λ, ω) of the system as a step of the pose.
 #[inline(always)]
 pub fn step_of<T: Real>(mech: &Mechanism, x: [T; 6], share: T) -> Twist<T> {
-    let [a, b, c, p, q, r] = x.map(|e| e * share);
-    Twist::new(Vec3::new(a, b, c) * T::lit(mech.characteristic_length), Vec3::new(p, q, r))
+    let Twist { v, omega } = Twist::from_array(x);
+    Twist::new(v * share * T::lit(mech.characteristic_length), omega * share)
 }
 
 /// A Newton step from a pose towards `F = to`, and what it is judged by.

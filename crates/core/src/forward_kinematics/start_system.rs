@@ -12,6 +12,7 @@ use crate::model::mechanism::{Constraint, ConstraintKind, Mechanism};
 use crate::number::complex::Complex;
 use crate::number::lanes::Lanes;
 use crate::number::real::Real;
+use crate::number::slices::pairs;
 use crate::numerics::gauss::solve_all;
 use crate::numerics::random::Random;
 use crate::spatial::{Mat3, Pose, Vec3};
@@ -132,9 +133,10 @@ impl Family for Products<'_> {
 
     #[inline(always)]
     fn at<V: Lanes>(&self, place: &PathPoint<Complex<V>>, t: V) -> (System<Complex<V>>, [Complex<V>; 6]) {
-        let asked = self
-            .asked
-            .map(|LegTarget { place, square }| LegTarget { place: lift(place), square: lift(square) });
+        let mut asked = [LegTarget::none(); 6];
+        for (asked, LegTarget { place, square }) in pairs(&mut asked, self.asked) {
+            *asked = LegTarget { place: lift(place), square: lift(square) };
+        }
         let mut system = system(self.mech, &place.pose(), &asked);
         let coordinates = StudyCoordinates::of(place, self.mech.characteristic_length);
         let (share, rest) = (Complex::new(t, V::zero()), Complex::new(V::one() - t, V::zero()));

@@ -7,10 +7,12 @@
 use crate::kinematics::constraint;
 use crate::model::mechanism::{Constraint, ConstraintKind, MAX_CONSTRAINTS, Mechanism};
 use crate::model::status::Status;
-use crate::number::lanes::{Lanes, Work, any};
+use crate::number::lanes::{Lanes, any};
 use crate::number::outlined::Outlined;
 use crate::number::real::count;
 use crate::number::real::{Constant, Dual, Jet, Mask, Ordered, Real, Scalar, Trig};
+use crate::number::slices;
+use crate::number::work::Work;
 use crate::numerics::gauss::{solve, solve_all};
 use crate::spatial::{Acceleration, Mat3, Motion, Pose, Twist, Vec3};
 
@@ -196,14 +198,14 @@ impl Set {
         match self {
             Set::Paper(plane) => {
                 let [alpha, beta, gamma] = plane.angles(pose);
-                q[..6].copy_from_slice(&[o[0], o[1], o[2], alpha, beta, gamma]);
+                slices::copy(&[o[0], o[1], o[2], alpha, beta, gamma], &mut q[..6]);
             }
             Set::Natural(plane) => {
                 let [alpha, beta, gamma] = plane.angles(pose);
                 let middle = Mat3::lift(plane.base).transpose_mul(plane.middle(pose));
                 let (s, c) = alpha.sin_cos();
                 let h = middle.z * c - middle.y * s;
-                q[..5].copy_from_slice(&[alpha, middle.x, h, beta, gamma]);
+                slices::copy(&[alpha, middle.x, h, beta, gamma], &mut q[..5]);
             }
             Set::Tool => {
                 let axis = pose.rotation.of(mech.tool_axis);
@@ -213,14 +215,14 @@ impl Set {
                     * Mat3::lift(mech.home.rotation.transpose());
                 let across = home_axis.perpendicular();
                 let turned = turn.of(across);
-                q[..3].copy_from_slice(&(pose.o + pose.rotation.of(mech.tool_point)).array());
-                q[3..6].copy_from_slice(&axis.array());
+                slices::copy(&(pose.o + pose.rotation.of(mech.tool_point)).array(), &mut q[..3]);
+                slices::copy(&axis.array(), &mut q[3..6]);
                 let side = Vec3::lift(home_axis.cross(across));
                 q[6] = side.dot(turned).atan2(Vec3::lift(across).dot(turned));
             }
             Set::Pose => {
                 let r = pose.rotation.rows();
-                q[..3].copy_from_slice(&o);
+                slices::copy(&o, &mut q[..3]);
                 q[3] = (-r[1][2]).atan2(r[2][2]);
                 q[4] = r[0][2].atan2(r[1][2].mul_add(r[1][2], r[2][2] * r[2][2]).sqrt());
                 q[5] = (-r[0][1]).atan2(r[0][0]);
@@ -669,6 +671,7 @@ pub struct Dependent {
 
 impl Dependent {
     #[must_use]
+    #[inline]
     pub fn of<S: Scalar>(set: &Set<S>, given: &[bool]) -> Self {
         let mut dependent = Dependent { indices: [0; MAX_COORDINATES], count: 0 };
         for i in (0..set.names().len()).filter(|&i| !given[i]) {

@@ -90,7 +90,11 @@ pub fn platform_acceleration<T: Real>(
 #[inline(always)]
 fn padded<T: Real>(values: &[T]) -> [T; 6] {
     let mut padded = [T::zero(); 6];
-    padded[..values.len()].copy_from_slice(values);
+    for k in 0..6 {
+        if k < values.len() {
+            padded[k] = values[k];
+        }
+    }
     padded
 }
 
@@ -119,7 +123,7 @@ impl<V: Lanes> MotionSolver<V> {
     #[must_use]
     pub fn new(mech: &Mechanism) -> Self {
         MotionSolver {
-            driven: Vec::with_capacity(mech.legs.len()),
+            driven: vec![V::zero(); mech.actuated().count()],
             rest: vec![],
             redundant: mech.is_redundant().then(|| RedundantRows::new(mech)),
         }
@@ -153,7 +157,7 @@ impl<V: Lanes> MotionSolver<V> {
         }
         let size = norm(&self.driven[..n]) + norm(&self.rest[..n]);
         for (k, rest) in self.rest.iter_mut().enumerate() {
-            *rest = self.driven.get(k).copied().unwrap_or_else(V::zero) - *rest;
+            *rest = if k < self.driven.len() { self.driven[k] } else { V::zero() } - *rest;
         }
         let (legs, others) = self.rest.split_at(n);
         let (motion, agrees) = rows.follow(legs, others, size);

@@ -7,8 +7,10 @@
 use crate::kinematics::constraint;
 use crate::kinematics::rows::Row;
 use crate::model::mechanism::Mechanism;
-use crate::number::lanes::{Lanes, Work};
+use crate::number::lanes::Lanes;
 use crate::number::real::Ordered;
+use crate::number::slices::{self, pairs};
+use crate::number::work::Work;
 use crate::numerics::householder::Householder;
 use crate::spatial::{Pose, Twist, Wrench};
 
@@ -84,7 +86,7 @@ impl<V: Lanes> RedundantRows<V> {
     /// The same with given rows of the legs, in pure numbers.
     #[inline(always)]
     pub(crate) fn factor_with(&mut self, mech: &Mechanism, pose: &Pose<V>, legs: &[[V; 6]]) {
-        self.legs.copy_from_slice(legs);
+        slices::copy(legs, &mut self.legs);
         self.set_others(mech, pose);
         self.factor_set();
     }
@@ -133,8 +135,8 @@ impl<V: Lanes> RedundantRows<V> {
     #[inline(always)]
     pub fn put_forces(&self, all: &mut [V]) {
         let (forces, multipliers) = all.split_at_mut(self.forces.len());
-        forces.copy_from_slice(&self.forces);
-        multipliers.copy_from_slice(&self.multipliers);
+        slices::copy(&self.forces, forces);
+        slices::copy(&self.multipliers, multipliers);
     }
 
     /// Where the legs' rates (or accelerations) have a twist, and that in the sense of least squares;
@@ -144,7 +146,7 @@ impl<V: Lanes> RedundantRows<V> {
     pub fn follow(&mut self, legs: &[V], others: &[V], size: V) -> (Twist<V>, V::Mask) {
         // f - A y = -ℓ' with AᵀF = 0: y in the sense of least squares, f what it misses.
         let mut asked = std::mem::take(&mut self.unit);
-        for (x, rate) in asked.iter_mut().zip(legs) {
+        for (x, rate) in pairs(&mut asked, legs) {
             *x = -*rate;
         }
         self.solve(Wrench::zero(), &asked[..legs.len()], others);
@@ -179,7 +181,7 @@ impl<V: Lanes> Work<V> for Factor<'_, V> {
     #[inline(always)]
     fn run(self) {
         let Factor { rows, mech, pose } = self;
-        for (row, (_, leg)) in rows.legs.iter_mut().zip(mech.actuated()) {
+        for (row, (_, leg)) in pairs(&mut rows.legs, mech.actuated()) {
             *row = Row::Leg(leg).pure(pose, rows.scale);
         }
         rows.set_others(mech, pose);
@@ -248,7 +250,7 @@ impl<V: Lanes> Work<V> for Solve<'_, V> {
         // The least y that the others ask for, and the forces that go with it.
         let mut y = [V::zero(); 6];
         if !rates.is_empty() {
-            for (rate, &k) in rates.iter().zip(&*numbers) {
+            for (rate, &k) in pairs(rates, &*numbers) {
                 y[k] = rate.scale(units[k]);
             }
             others.solve(&mut y);
@@ -259,26 +261,26 @@ impl<V: Lanes> Work<V> for Solve<'_, V> {
         }
         // What they leave of the wrench, as far as allowed twists feel it, the least forces balance.
         let unbalanced = unbalanced(w, legs, forces);
-        added.fill(V::zero());
-        for (x, twist) in added.iter_mut().zip(&*allowed) {
+        slices::fill(added, V::zero());
+        for (x, twist) in pairs(&mut *added, &*allowed) {
             *x = dot(twist, &unbalanced);
         }
         on_allowed.solve_lower(added);
         let mut shares = [V::zero(); 6];
-        shares[..allowed.len()].copy_from_slice(&added[..allowed.len()]);
+        slices::copy(&added[..allowed.len()], &mut shares[..allowed.len()]);
         on_allowed.rotate(added);
-        for (force, x) in forces.iter_mut().zip(&*added) {
+        for (force, x) in pairs(&mut *forces, &*added) {
             *force = *force + *x;
         }
         on_allowed.solve_upper(&mut shares);
-        for (share, twist) in shares.iter().zip(&*allowed) {
+        for (share, twist) in pairs(&shares, &*allowed) {
             for j in 0..6 {
                 y[j] = share.mul_add(twist[j], y[j]);
             }
         }
         let mut rest = self::unbalanced(w, legs, forces);
         others.solve_transposed(&mut rest);
-        for (multiplier, &k) in multipliers.iter_mut().zip(&*numbers) {
+        for (multiplier, &k) in pairs(multipliers, &*numbers) {
             *multiplier = rest[k].scale(units[k]);
         }
         let Twist { v, omega } = Twist::from_array(y);
@@ -290,7 +292,7 @@ impl<V: Lanes> Work<V> for Solve<'_, V> {
 #[inline(always)]
 fn unbalanced<V: Ordered>(w: [V; 6], legs: &[[V; 6]], forces: &[V]) -> [V; 6] {
     let mut rest = w;
-    for (row, force) in legs.iter().zip(forces) {
+    for (row, force) in pairs(legs, forces) {
         for j in 0..6 {
             rest[j] = (-row[j]).mul_add(*force, rest[j]);
         }

@@ -294,18 +294,43 @@ impl<S> Mechanism<S> {
     /// Rows of the Jacobian: actuated legs, local degrees of freedom, independent constraints. Six, or more
     /// where actuators are redundant.
     #[must_use]
+    #[inline]
     pub fn rows(&self) -> usize {
         self.actuated().count() + self.idle.len() + self.independent.len()
     }
 
     /// Whether more legs are actuated than it takes: the Jacobian then has more rows than columns \[T72\].
     #[must_use]
+    #[inline]
     pub fn is_redundant(&self) -> bool {
         self.rows() > 6
     }
 
-    /// Legs with an actuator, in the order of the Jacobian's rows.
-    pub fn actuated(&self) -> impl Iterator<Item = (usize, &Leg<S>)> {
-        self.legs.iter().enumerate().filter(|(_, leg)| leg.actuated)
+    /// Legs with an actuator and their numbers, in the order of the Jacobian's rows.
+    #[inline(always)]
+    pub fn actuated(&self) -> Actuated<'_, S> {
+        Actuated { legs: &self.legs, next: 0 }
+    }
+}
+
+/// See [`Mechanism::actuated`].
+#[derive(Clone, Debug)]
+pub struct Actuated<'a, S> {
+    legs: &'a [Leg<S>],
+    next: usize,
+}
+
+impl<'a, S> Iterator for Actuated<'a, S> {
+    type Item = (usize, &'a Leg<S>);
+
+    #[inline(always)]
+    fn next(&mut self) -> Option<Self::Item> {
+        while let Some(leg) = self.legs.get(self.next) {
+            self.next += 1;
+            if leg.actuated {
+                return Some((self.next - 1, leg));
+            }
+        }
+        None
     }
 }

@@ -4,8 +4,9 @@
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
-use crate::number::lanes::{Lanes, Work};
+use crate::number::lanes::Lanes;
 use crate::number::real::{Constant, Dual, Jet, Mask, Real, Trig};
+use crate::number::work::Work;
 
 /// The number that it is: rates and second rates along a motion, with a derivative of each.
 type Parts<V> = Jet<Dual<V>>;
@@ -16,14 +17,14 @@ pub(crate) struct Outlined<V>(pub Parts<V>);
 /// Functions of one or two numbers that are called.
 macro_rules! called {
     ($($work:ident($a:ident, $b:ident) -> $result:ty: $value:expr;)*) => {$(
-        struct $work<V>(Parts<V>, Parts<V>);
+        struct $work<'a, V>(&'a Parts<V>, &'a Parts<V>);
 
-        impl<V: Lanes> Work<V> for $work<V> {
+        impl<V: Lanes> Work<V> for $work<'_, V> {
             type Result = $result;
 
             #[inline(always)]
             fn run(self) -> $result {
-                let $work($a, $b) = self;
+                let $work(&$a, &$b) = self;
                 $value
             }
         }
@@ -58,7 +59,7 @@ impl<V: Lanes> Mul for Outlined<V> {
     type Output = Self;
     #[inline(always)]
     fn mul(self, b: Self) -> Self {
-        Outlined(V::apart(Product(self.0, b.0)))
+        Outlined(V::apart(Product(&self.0, &b.0)))
     }
 }
 
@@ -66,7 +67,7 @@ impl<V: Lanes> Div for Outlined<V> {
     type Output = Self;
     #[inline(always)]
     fn div(self, b: Self) -> Self {
-        Outlined(V::apart(Quotient(self.0, b.0)))
+        Outlined(V::apart(Quotient(&self.0, &b.0)))
     }
 }
 
@@ -90,7 +91,7 @@ impl<V: Lanes> Real for Outlined<V> {
     }
     #[inline(always)]
     fn sqrt(self) -> Self {
-        Outlined(V::apart(Root(self.0, self.0)))
+        Outlined(V::apart(Root(&self.0, &self.0)))
     }
     #[inline(always)]
     fn scale(self, x: f64) -> Self {
@@ -105,16 +106,16 @@ impl<V: Lanes> Real for Outlined<V> {
 impl<V: Lanes> Trig for Outlined<V> {
     #[inline(always)]
     fn sin_cos(self) -> (Self, Self) {
-        let (sine, cosine) = V::apart(SineAndCosine(self.0, self.0));
+        let (sine, cosine) = V::apart(SineAndCosine(&self.0, &self.0));
         (Outlined(sine), Outlined(cosine))
     }
     #[inline(always)]
     fn acos(self) -> Self {
-        Outlined(V::apart(ArcCosine(self.0, self.0)))
+        Outlined(V::apart(ArcCosine(&self.0, &self.0)))
     }
     #[inline(always)]
     fn atan2(self, x: Self) -> Self {
-        Outlined(V::apart(Angle(self.0, x.0)))
+        Outlined(V::apart(Angle(&self.0, &x.0)))
     }
 }
 

@@ -10,6 +10,8 @@
 use std::fmt::Debug;
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
+use crate::number::work::Work;
+
 /// A number for the kernels: no trigonometry, no branching on values.
 pub trait Real:
     Copy
@@ -45,6 +47,12 @@ pub trait Real:
     #[inline(always)]
     fn mul_add(self, a: Self, b: Self) -> Self {
         self * a + b
+    }
+
+    /// Does a part of a long computation: in a function of its own where the number is a register.
+    #[inline(always)]
+    fn apart<W: Work<Self>>(work: W) -> W::Result {
+        work.run()
     }
 
     /// `a` where `choose`, else `b`: the kernels' only choice.

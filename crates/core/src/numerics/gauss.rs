@@ -124,7 +124,10 @@ pub fn determinant<T: Real>(m: &[[T; 6]; 6]) -> T {
     for set in 1..64_usize {
         let row = set.count_ones() as usize - 1;
         let mut sum = T::zero();
-        for column in (0..6).filter(|c| set >> c & 1 == 1) {
+        for column in 0..6 {
+            if set >> column & 1 == 0 {
+                continue;
+            }
             // The entry's sign is that of the number of columns in the set to the right of its own.
             let term = m[row][column] * d[set & !(1 << column)];
             sum = if (set >> (column + 1)).count_ones() % 2 == 0 { sum + term } else { sum - term };

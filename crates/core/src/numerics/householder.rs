@@ -3,6 +3,7 @@
 //! and no allocation once it is made.
 
 use crate::number::real::Ordered;
+use crate::number::slices;
 
 /// `m = L Qᵀ` of a matrix with no more rows than columns: L lower triangular, Q a product of Householder reflections.
 #[derive(Clone, Debug)]
@@ -46,7 +47,7 @@ impl<V: Ordered> Householder<V> {
     #[inline(always)]
     pub fn set_row(&mut self, row: usize, entries: &[V]) {
         let start = row * self.columns;
-        self.entries[start..start + self.columns].copy_from_slice(entries);
+        slices::copy(entries, &mut self.entries[start..start + self.columns]);
     }
 
     #[inline(always)]

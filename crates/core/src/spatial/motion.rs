@@ -45,10 +45,8 @@ impl Pose<f64> {
     /// The homogeneous matrix, row by row.
     #[must_use]
     pub fn matrix(&self) -> [f64; 16] {
-        let ([x, y, z], o) = (self.rotation.rows(), self.o.array());
-        let row = |r: [f64; 3], o: f64| [r[0], r[1], r[2], o];
-        let rows = [row(x, o[0]), row(y, o[1]), row(z, o[2]), [0.0, 0.0, 0.0, 1.0]];
-        std::array::from_fn(|i| rows[i / 4][i % 4])
+        let ([x, y, z], o) = (self.rotation.0, self.o);
+        [x.x, y.x, z.x, o.x, x.y, y.y, z.y, o.y, x.z, y.z, z.z, o.z, 0.0, 0.0, 0.0, 1.0]
     }
 }
 

@@ -35,8 +35,8 @@ pub(crate) fn get(poses: &Poses, k: usize) -> Pose<f64> {
 }
 
 pub(crate) fn put(poses: &mut Poses, k: usize, pose: &Pose<f64>) {
-    let columns = pose.rotation.0.into_iter().chain([pose.o]);
-    for (row, x) in poses.iter_mut().zip(columns.flat_map(Vec3::array)) {
-        row[k] = x;
+    let [x, y, z] = pose.rotation.0;
+    for (i, column) in [x, y, z, pose.o].into_iter().enumerate() {
+        [poses[3 * i][k], poses[3 * i + 1][k], poses[3 * i + 2][k]] = column.array();
     }
 }

@@ -113,6 +113,7 @@ impl Vec3<f64> {
 impl<T: Scalar> Vec3<T> {
     /// A unit vector perpendicular to this one, on the side of the base axis that this one leans on least.
     #[must_use]
+    #[inline]
     pub fn perpendicular(self) -> Self {
         let [x, y, z] = self.map(|c| c.value().abs()).array();
         let axis = if z <= x && z <= y {
@@ -174,8 +175,10 @@ impl<T: Real> Mat3<T> {
         Mat3([Vec3::new(x[0], y[0], z[0]), Vec3::new(x[1], y[1], z[1]), Vec3::new(x[2], y[2], z[2])])
     }
 
+    #[inline(always)]
     pub fn rows(self) -> [[T; 3]; 3] {
-        self.transpose().0.map(Vec3::array)
+        let [x, y, z] = self.transpose().0;
+        [x.array(), y.array(), z.array()]
     }
 
     #[must_use]
