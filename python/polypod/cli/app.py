@@ -7,12 +7,12 @@ from typing import Annotated
 
 import typer
 
-from polypod.cli import demo, export, fk, info, new, report, simulate, solve, verify, view, workspace
+from polypod.cli import demo, explain, export, fk, info, new, report, simulate, solve, verify, view, workspace
 from polypod.cli import list as list_
 from polypod.errors import PolypodError
 
 # In the order of the help. A command imports what is heavy where it needs it, so that help comes at once.
-COMMANDS = (demo, list_, info, new, solve, simulate, fk, workspace, verify, view, export, report)
+COMMANDS = (demo, list_, info, new, solve, simulate, fk, workspace, verify, view, export, report, explain)
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -30,7 +30,7 @@ def main() -> None:
     try:
         app()
     except (PolypodError, OSError) as error:
-        print(f"polypod: {_readable(error)}", file=sys.stderr)
+        print(f"polypod: {_readable(error)}{_terms_of(error)}", file=sys.stderr)
         sys.exit(2)
 
 
@@ -38,6 +38,15 @@ def _readable(error: Exception) -> str:
     if isinstance(error, OSError) and error.strerror:
         return f"{error.filename}: {error.strerror}" if error.filename else error.strerror
     return str(error)
+
+
+def _terms_of(error: Exception) -> str:
+    """Where its terms are explained: a line for the first of them, if there is one."""
+    if not isinstance(error, PolypodError):
+        return ""
+    from polypod.summary.glossary import terms_in
+
+    return "".join(f'\nTerms: polypod explain "{term}"' for term in terms_in(str(error))[:1])
 
 
 def _print_version(wanted: bool) -> None:

@@ -103,5 +103,6 @@ def print_solution(out: Console, facts: dict[str, Any]) -> None:
         out.print(f"[bold yellow]Warning:[/bold yellow] {escape(warning)}")
     if facts["outcomes"]:
         print_words(out, outcomes_table(facts))
+        out.print(f"What they mean: polypod explain {facts['outcomes'][0]['status']}", highlight=False)
     else:
         out.print(outcome(facts))
