@@ -1,7 +1,7 @@
 """The mechanism in Pinocchio: every link, all joints solved, the tree's inverse dynamics on allowed motions.
 
 Pinocchio gives positions, velocities, accelerations and Jacobians of frames, and the generalised forces of
-the tree; what the loops add is here, in terms of those alone [T60]-[T62].
+the tree; what the loops add is here, in terms of those alone [T60] [T61] [T62].
 """
 
 from __future__ import annotations
