@@ -2,8 +2,8 @@
 //! manipulator and the peak rates of multiplications and additions, of divisions and of square roots, as
 //! JSON.
 //!
-//! The kernels run with a number that counts. Comparisons, selections, signs and memory are free; a division and a
-//! square root count as one flop each, though they take longer. Checks of the input are not in it.
+//! The kernels run with a number that counts. Comparisons, selections, signs and memory are free; a division
+//! and a square root count as one flop each, though they take longer. Checks of the input are not in it.
 
 #[path = "../../core/tests/common/mod.rs"]
 mod common;
@@ -160,8 +160,8 @@ const ROUNDS: usize = 50_000;
 /// Short ones, of which the fastest counts: a peak is what nothing else has slowed down.
 const RUNS: usize = 50;
 
-/// Operations a second in registers only: fused multiplications and additions (where the registers fuse them), separate ones,
-/// divisions, square roots.
+/// Operations a second in registers only: fused multiplications and additions (where the registers fuse
+/// them), separate ones, divisions, square roots.
 type Rates = [f64; 4];
 
 struct Peak<'a>(&'a mut Rates);

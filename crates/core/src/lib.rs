@@ -1,9 +1,11 @@
 //! The equations of parallel manipulators on telescopic legs, generic over the number.
 //!
-//! Rooms from the ground up: each imports only from those above it in the list below, which `tools/imports.py` checks.
+//! Rooms from the ground up: each imports only from those above it in the list below, which
+//! `tools/imports.py` checks.
 //!
-//! Labels in brackets name their source: `[Eq. 26]` an equation of Lu, Liu, Zhang, Ye and Wang, "Dynamics analysis of
-//! a novel 5-DoF parallel manipulator with couple-constrained wrench"; `[T6]` one of `docs/theory.md`.
+//! Labels in brackets name their source: `[Eq. 26]` an equation of Lu, Liu, Zhang, Ye and Wang, "Dynamics
+//! analysis of a novel 5-DoF parallel manipulator with couple-constrained wrench"; `[T6]` one of
+//! `docs/theory.md`.
 
 #![cfg_attr(test, allow(dead_code))]
 

@@ -1,10 +1,12 @@
-//! States of many coordinates are those of each: bit by bit in lanes, within rounding where they go state by state.
+//! States of many coordinates are those of each: bit by bit in lanes, within rounding where they go state by
+//! state.
 
 mod common;
 
 use common::{mechanisms, states};
 use polypod_core::batch::{self, Coordinates};
 use polypod_core::kinematics::coordinate_sets::{self, Set};
+use polypod_core::kinematics::dependent_coordinates;
 use polypod_core::model::mechanism::Mechanism;
 use polypod_core::model::status::Status;
 
@@ -41,7 +43,7 @@ fn states_of_many_coordinates_are_those_of_each() {
         for set in Set::of(&mech) {
             let all = series(&mech, &set, count);
             // The least that must be given, and all that may be: γ of the paper's set is never.
-            let least = coordinate_sets::best_given(&mech, &set);
+            let least = dependent_coordinates::best_given(&mech, &set);
             let most = vec![true; all.len()];
             for given in if matches!(set, Set::Paper(_)) { vec![least] } else { vec![least, most] } {
                 for branch in [1.0, -1.0] {

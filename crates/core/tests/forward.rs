@@ -6,7 +6,8 @@ use common::{Draw, every_leg, on_rod, published, six_sliders, states, with_leg, 
 use polypod_core::batch::{self, Coordinates, Loads, States};
 use polypod_core::forward_kinematics::assembly_modes::{Modes, assembly_modes, start};
 use polypod_core::forward_kinematics::newton::{asked, error, forward_kinematics, polish, step_of};
-use polypod_core::kinematics::coordinate_sets::{self, MAX_COORDINATES, Set, Values};
+use polypod_core::kinematics::coordinate_sets::{MAX_COORDINATES, Set, Values};
+use polypod_core::kinematics::dependent_coordinates;
 use polypod_core::kinematics::jacobian::scaled_jacobian;
 use polypod_core::kinematics::leg;
 use polypod_core::mobility::singularity::TOLERANCE;
@@ -46,7 +47,8 @@ fn near(q: &Values<f64>, spread: f64, draw: &mut Draw) -> Values<f64> {
     near
 }
 
-/// The end of many short steps along the straight line of lengths from the guess's own: what continuation means.
+/// The end of many short steps along the straight line of lengths from the guess's own: what continuation
+/// means.
 fn continued(mech: &Mechanism, to: &[f64], guess: &Pose<f64>) -> Option<Pose<f64>> {
     let from = lengths(mech, guess);
     let (mut pose, mut t, mut h) = (*guess, 0.0_f64, 1e-3_f64);
@@ -285,7 +287,7 @@ fn a_pose_with_a_leg_backwards_in_a_fixed_joint_is_none() {
             assert_eq!(table.status, [Status::Ok, none, third], "{letters}: {name}");
         }
         let (numbers, zero) = (Set::Pose.values(&mech, &backwards).map(|x| [x]), [0.0]);
-        let free = coordinate_sets::best_given(&mech, &Set::Pose);
+        let free = dependent_coordinates::best_given(&mech, &Set::Pose);
         let guess = backwards.matrix();
         for (all, guess) in [(true, None), (true, Some(&guess[..])), (false, Some(&guess))] {
             let series = |k: usize| (all || free[k]).then_some([&numbers[k][..], &zero, &zero]);

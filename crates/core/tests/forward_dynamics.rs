@@ -1,5 +1,5 @@
-//! Accelerations from forces against the inverse dynamics, and the charts of simulations against jets, for every leg
-//! of the catalogue and for the published manipulator.
+//! Accelerations from forces against the inverse dynamics, and the charts of simulations against jets, for
+//! every leg of the catalogue and for the published manipulator.
 
 mod common;
 
@@ -100,7 +100,8 @@ fn charts_keep_the_constraints_and_know_their_rates() {
             let (t, h) = (0.05, 1e-4);
             let [before, now, after] = [at(t - h), at(t), at(t + h)];
             assert!(constraint::largest_distance(&mech, &now.pose) < 1e-13, "{}", mech.name);
-            // Along θ = t θ' the second rates are zero: the acceleration by differences of twists must say so.
+            // Along θ = t θ' the second rates are zero: the acceleration by differences of twists must say
+            // so.
             let rate = |a: Vec3<f64>, b: Vec3<f64>| (b - a) * (0.5 / h);
             let v = rate(before.pose.o, after.pose.o);
             close(now.twist.v, v, 1e-5, &mech.name);

@@ -6,7 +6,8 @@ mod common;
 use common::published;
 use polypod_core::kinematics::coordinate_sets::Set;
 use polypod_core::number::lanes;
-use polypod_core::workspace::length_lattice::{Lattice, Reached};
+use polypod_core::workspace::lattice_poses::Reached;
+use polypod_core::workspace::length_lattice::Lattice;
 
 fn reached(set: &str) -> Reached {
     assert!(lanes::use_instructions(set));

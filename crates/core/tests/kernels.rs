@@ -1,5 +1,5 @@
-//! The closed formulas against the derivatives that jets and duals take of positions alone, for every leg of the
-//! catalogue and for the published manipulator.
+//! The closed formulas against the derivatives that jets and duals take of positions alone, for every leg of
+//! the catalogue and for the published manipulator.
 
 mod common;
 
@@ -17,7 +17,8 @@ use polypod_core::spatial::{Acceleration, Mat3, Motion, Pose, Twist, Vec3, Wrenc
 /// Relative, for second derivatives by two routes in double precision.
 const EXACT: f64 = 1e-10;
 
-/// States to test at: generic ones, and for the published manipulator its nearly singular neighbourhood of home.
+/// States to test at: generic ones, and for the published manipulator its nearly singular neighbourhood of
+/// home.
 fn samples(mech: &Mechanism) -> Vec<Motion<f64>> {
     states(mech, 6, 11)
 }

@@ -1,5 +1,5 @@
-//! Joint reactions against the rates of momentum of every link, for every leg of the catalogue and for rods with one
-//! to three legs.
+//! Joint reactions against the rates of momentum of every link, for every leg of the catalogue and for rods
+//! with one to three legs.
 
 mod common;
 
@@ -23,8 +23,8 @@ fn load(mech: &Mechanism, state: &Motion<f64>) -> Wrench<f64> {
     inverse_dynamics::load_in_base(mech.load.wrench, mech.load.axes, &state.pose)
 }
 
-/// Weight less the rates of linear momentum, and of angular momentum about the mass centre, of a link that moves as its axes
-/// do; with its mass centre.
+/// Weight less the rates of linear momentum, and of angular momentum about the mass centre, of a link that
+/// moves as its axes do; with its mass centre.
 fn by_momentum(body: &Body, axes: Mat3<Jet<f64>>, place: Vec3<Jet<f64>>, gravity: Vec3<f64>) -> Link {
     let [center, _, acceleration] = parts(place + axes * Vec3::lift(body.center));
     // ω = ½ Σ x_i × x_i' and its rate, over the columns of the axes.

@@ -21,7 +21,8 @@ impl Array<'_> {
         if !self.0.is_c_contiguous() {
             return None;
         }
-        // SAFETY: no reference into an array of Python outlives a call, and nothing here writes to an argument.
+        // SAFETY: no reference into an array of Python outlives a call, and nothing here writes to an
+        // argument.
         unsafe { self.0.as_slice() }.ok()
     }
 }
@@ -47,8 +48,8 @@ impl PyAxes {
         PyAxes(axes)
     }
 
-    /// Whether the arguments can be handed over as they are: contiguous arrays of doubles with these last axes, and the same
-    /// axes before them.
+    /// Whether the arguments can be handed over as they are: contiguous arrays of doubles with these last
+    /// axes, and the same axes before them.
     fn fit(&self, arguments: &Bound<'_, PyTuple>) -> bool {
         let mut batch: Option<Vec<usize>> = None;
         arguments.len() == self.0.len()

@@ -7,17 +7,9 @@ use polypod_core::dynamics::regressor::{parameters, standard_values};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use crate::Array;
-
-use crate::PyMechanism;
-
-use crate::arrays;
-
-use crate::batch_of;
-
-use crate::loads;
-
-use crate::states;
+use crate::arrays::{Array, arrays, batch_of};
+use crate::mechanism::PyMechanism;
+use crate::states::{loads, states};
 
 /// Names of the coordinates that are varied, and the arrays.
 #[pyfunction]

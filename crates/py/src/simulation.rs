@@ -10,11 +10,8 @@ use polypod_core::spatial::{Twist, Wrench};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use crate::Array;
-
-use crate::PyMechanism;
-
-use crate::slice;
+use crate::arrays::{Array, slice};
+use crate::mechanism::PyMechanism;
 
 #[pyclass(name = "Chart", frozen)]
 pub struct PyChart {
@@ -73,8 +70,8 @@ impl PyChart {
         Ok((pose, PyArray1::from_slice(py, &twist)))
     }
 
-    /// The rates of coordinates and rates under the forces of all legs and a load (the mechanism's own without one); NaN
-    /// where there are none.
+    /// The rates of coordinates and rates under the forces of all legs and a load (the mechanism's own
+    /// without one); NaN where there are none.
     #[pyo3(signature = (y, forces, wrench, platform_axes))]
     fn rates<'py>(
         &self,

@@ -11,11 +11,8 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use crate::Array;
-
-use crate::PyMechanism;
-
-use crate::slice;
+use crate::arrays::{Array, slice};
+use crate::mechanism::PyMechanism;
 
 /// Codes of what stops the platform where it is no limit.
 const SINGULARITY: i64 = -1;
@@ -93,7 +90,8 @@ impl PyFlood {
         PyArray1::from_slice(py, &self.flood.mask)
     }
 
-    /// The cut edges: reached node, direction (-x, x, -y, y, -z, z), share inside, pose, what stops it, margin.
+    /// The cut edges: reached node, direction (-x, x, -y, y, -z, z), share inside, pose, what stops it,
+    /// margin.
     fn edges<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let (mech, team, flood) = (self.mech.get().core(), &self.team, &self.flood);
         let edges = py.detach(|| team.install(|| flood.edges(mech)));
@@ -126,7 +124,8 @@ pub struct PyLattice {
 
 #[pymethods]
 impl PyLattice {
-    /// None where an actuated leg has no stroke, or no pose inside in the start's mode has the lengths next to it.
+    /// None where an actuated leg has no stroke, or no pose inside in the start's mode has the lengths next
+    /// to it.
     #[staticmethod]
     fn begin(
         mech: Py<PyMechanism>,
@@ -158,7 +157,8 @@ impl PyLattice {
         self.lattice.reached.inside
     }
 
-    /// Counts, extents (3, 2), the profile (layers, 4) of least and greatest x and y, lower end and height of layers.
+    /// Counts, extents (3, 2), the profile (layers, 4) of least and greatest x and y, lower end and height of
+    /// layers.
     fn reached<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let reached = &self.lattice.reached;
         let result = PyDict::new(py);

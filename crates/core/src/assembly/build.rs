@@ -27,7 +27,8 @@ const SHORTEST_LEG: f64 = 1e-6;
 /// The mechanism that a spec describes.
 ///
 /// # Errors
-/// Every fault that the spec shows, with its place; none if the spec only lacks parts that its reader has reported.
+/// Every fault that the spec shows, with its place; none if the spec only lacks parts that its reader has
+/// reported.
 pub fn assemble(spec: &Spec) -> Result<Mechanism, Vec<Fault>> {
     let (values, parts) = (spec.check_values(), spec.check_parts());
     let home = spec
@@ -117,8 +118,8 @@ fn check_freedoms(mech: &Mechanism) -> Option<Fault> {
     let Mobility { joint_freedoms, closure_rank, passive, .. } = mech.mobility;
     if joint_freedoms != closure_rank + dof + passive {
         let message = format!(
-            "its constraints leave {dof} degrees of freedom, but its loop closures {joint_freedoms} - {closure_rank} - \
-             {passive}; this combination of joints is not modelled"
+            "its constraints leave {dof} degrees of freedom, but its loop closures {joint_freedoms} - \
+             {closure_rank} - {passive}; this combination of joints is not modelled"
         );
         return Some(Fault::new("mechanism", message));
     }
@@ -256,8 +257,8 @@ fn check_leg_at_home(spec: &Spec, place: &str, leg: &LegSpec, home: &Pose<f64>) 
             faults.push(Fault::new(
                 format!("{place}.{side}.{key}"),
                 format!(
-                    "makes {degrees:.4} degrees with the leg at the home pose; {need}: correct the axis, the points or \
-                     the home pose"
+                    "makes {degrees:.4} degrees with the leg at the home pose; {need}: correct the axis, the \
+                     points or the home pose"
                 ),
             ));
         }
@@ -275,8 +276,8 @@ fn home_message(mech: &Mechanism, c: &Constraint, missed: f64) -> String {
     let nearest = found.filter(close).map_or_else(String::new, |p| {
         let ([x, y, z], [u, v, w]) = (p.o.array(), p.rotation.rotation_vector().array());
         format!(
-            "; a pose nearby that satisfies all constraints has position [{x:.9}, {y:.9}, {z:.9}] m and rotation_vector \
-             [{u:.9}, {v:.9}, {w:.9}] rad"
+            "; a pose nearby that satisfies all constraints has position [{x:.9}, {y:.9}, {z:.9}] m and \
+             rotation_vector [{u:.9}, {v:.9}, {w:.9}] rad"
         )
     });
     let meaning = match c.kind {

@@ -35,14 +35,15 @@ fn on_rail(slider: &SliderSpec, r: Vec3<f64>) -> Result<Vec3<f64>, String> {
     let ahead = (strut * strut - far * far).sqrt();
     if !(ahead > ANGLE_TOLERANCE * strut) {
         return Err(format!(
-            "is {strut} m; the platform point is {far:.6} m from the rail at the home pose, which the strut must exceed: \
-             perpendicular to its rail it is singular"
+            "is {strut} m; the platform point is {far:.6} m from the rail at the home pose, which the strut \
+             must exceed: perpendicular to its rail it is singular"
         ));
     }
     Ok(across + axis * (slider.branch * ahead))
 }
 
-/// Adds what is wrong with a drive beside the leg's joints and the home pose, and tells the strut there, if there is one.
+/// Adds what is wrong with a drive beside the leg's joints and the home pose, and tells the strut there, if
+/// there is one.
 pub(super) fn check(place: &str, leg: &LegSpec, r: Vec3<f64>, faults: &mut Vec<Fault>) -> Option<Vec3<f64>> {
     let Some(slider) = &leg.slider else { return Some(r) };
     if !(slider.axis.norm() > 0.0 && slider.strut > 0.0) {

@@ -50,8 +50,8 @@ impl GeometricParameter {
     }
 }
 
-/// All of them in order: base joint and platform joint of each leg and the parts of its drive, as rail and strut; rods.
-/// A leg on a rod has the rod's axis, no own.
+/// All of them in order: base joint and platform joint of each leg and the parts of its drive, as rail and
+/// strut; rods. A leg on a rod has the rod's axis, no own.
 #[must_use]
 pub fn parameters(mech: &Mechanism) -> Vec<GeometricParameter> {
     let joints = mech.legs.iter().enumerate().flat_map(|(i, leg)| {
@@ -79,8 +79,8 @@ pub fn parameters(mech: &Mechanism) -> Vec<GeometricParameter> {
         .collect()
 }
 
-/// The mechanism with the derivative of all its parts by one of its numbers, zero for none. The home pose is kept, and with
-/// it the angle between legs on one rod.
+/// The mechanism with the derivative of all its parts by one of its numbers, zero for none. The home pose is
+/// kept, and with it the angle between legs on one rod.
 #[must_use]
 pub fn varied(mech: &Mechanism, by: Option<&GeometricParameter>) -> Mechanism<Dual<f64>> {
     let lift = |place: ParameterSite, vector: Vector, a: Vec3<f64>| -> Vec3<Dual<f64>> {

@@ -1,7 +1,8 @@
 //! Blocks of states: an operation on one state, done on one in each lane \[T65\].
 //!
-//! Answers are written into rows, one number of each state side by side, and copied from there into arrays, one state
-//! after the other. So the memory is that of input and output and of one block for each thread, and no state allocates.
+//! Answers are written into rows, one number of each state side by side, and copied from there into arrays,
+//! one state after the other. So the memory is that of input and output and of one block for each thread, and
+//! no state allocates.
 
 use std::mem::MaybeUninit;
 use std::ops::Range;
@@ -54,7 +55,8 @@ impl<O: Operation<N>, const N: usize> Working<N> for O {
     }
 }
 
-/// The status of each lane, as its number: a negative one where numbers are answered though it does not stand.
+/// The status of each lane, as its number: a negative one where numbers are answered though it does not
+/// stand.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Codes<V>(V);
 
@@ -247,8 +249,8 @@ impl Pieces {
     pub const EACH: Self = Pieces { least: 1, unit: 1 };
 }
 
-/// The answers for all states, by a function that puts those of one state and tells its status: for operations that
-/// branch or allocate. What it does not put is NaN.
+/// The answers for all states, by a function that puts those of one state and tells its status: for
+/// operations that branch or allocate. What it does not put is NaN.
 pub(super) fn one_by_one<const N: usize>(
     states: usize,
     fields: [(&'static str, Vec<usize>); N],
@@ -390,8 +392,8 @@ impl<const N: usize> Part<'_, N> {
     }
 }
 
-/// An operation at some of the states, in blocks. A pair with the operation first, so that it is compiled with that (see
-/// [`Task`]).
+/// An operation at some of the states, in blocks. A pair with the operation first, so that it is compiled
+/// with that (see [`Task`]).
 impl<O: Working<N>, const N: usize> Task for (&O, Part<'_, N>) {
     #[inline(always)]
     fn run<V: Lanes>(self) {
@@ -428,8 +430,8 @@ impl<O: Working<N>, const N: usize> Task for (&O, Part<'_, N>) {
     }
 }
 
-/// From rows, states side by side, to states one after the other; NaN for those without an answer. Past the caches if there
-/// is room to put them together first.
+/// From rows, states side by side, to states one after the other; NaN for those without an answer. Past the
+/// caches if there is room to put them together first.
 #[inline(always)]
 fn copy<V: Lanes>(
     rows: &[Line],

@@ -82,7 +82,8 @@ pub(super) fn read_pose(mech: &Mechanism, poses: &[f64], i: usize) -> (Pose<f64>
     (pose, codes.status())
 }
 
-/// Whether every leg has a direction and a frame: no length of zero, no axis of a universal joint (or rod) along it.
+/// Whether every leg has a direction and a frame: no length of zero, no axis of a universal joint (or rod)
+/// along it.
 #[inline(always)]
 pub(super) fn with_legs<V: Lanes>(mech: &Mechanism, pose: &Pose<V>, mut codes: Codes<V>) -> Codes<V> {
     for leg in &mech.legs {
@@ -135,8 +136,8 @@ pub(super) fn check_legs(mech: &Mechanism, pose: &Pose<f64>) -> Status {
     with_legs(mech, pose, Codes::ok()).status()
 }
 
-/// The square of what a constraint's value may be, of its rate beside a squared speed of one, and so on: as large as
-/// the tolerance makes a step along its row.
+/// The square of what a constraint's value may be, of its rate beside a squared speed of one, and so on: as
+/// large as the tolerance makes a step along its row.
 #[inline(always)]
 fn square_tolerance<V: Lanes>(mech: &Mechanism, c: &Constraint, pose: &Pose<V>) -> V {
     let square = constraint::square(&constraint::row(c, pose), mech.characteristic_length);
@@ -188,7 +189,8 @@ pub(super) fn with_twist<V: Lanes>(
     codes
 }
 
-/// Whether pose, twist and acceleration keep the constraints, `g = ġ = g̈ = 0` \[T65\], with no leg backwards.
+/// Whether pose, twist and acceleration keep the constraints, `g = ġ = g̈ = 0` \[T65\], with no leg
+/// backwards.
 #[inline(always)]
 pub(super) fn with_motion<V: Lanes>(mech: &Mechanism, platform: &Motion<V>, codes: Codes<V>) -> Codes<V> {
     let Motion { pose, twist, acceleration } = platform;

@@ -5,9 +5,8 @@ use super::block::{self, Answers, At, Codes, Operation, Pieces};
 use super::checks::{
     check_legs, finite, forwards, is_rotation, pose_at, raw_pose, then, with_legs, with_motion,
 };
-use crate::kinematics::coordinate_sets::{
-    self, Conditions, CoordinateState, Dependent, MAX_COORDINATES, Set, Values,
-};
+use crate::kinematics::coordinate_sets::{self, MAX_COORDINATES, Set, Values};
+use crate::kinematics::dependent_coordinates::{self, Conditions, CoordinateState, Dependent};
 use crate::model::mechanism::Mechanism;
 use crate::model::status::Status;
 use crate::number::lanes::Lanes;
@@ -15,8 +14,8 @@ use crate::number::real::{Jet, Mask, Real};
 use crate::number::work::work;
 use crate::spatial::Motion;
 
-/// Given coordinates of the states with their rates and second rates: `given[k]` holds the three series of the
-/// `k`-th number of the set, or nothing where it is to be solved.
+/// Given coordinates of the states with their rates and second rates: `given[k]` holds the three series of
+/// the `k`-th number of the set, or nothing where it is to be solved.
 #[derive(Clone, Debug)]
 pub struct Coordinates<'a> {
     pub set: Set,
@@ -28,7 +27,8 @@ pub struct Coordinates<'a> {
     pub continued: bool,
 }
 
-/// Pose, twist, acceleration and all coordinates of the set [Eq. 2, 5] \[T19\]-\[T23\].
+/// Pose, twist, acceleration and all coordinates of the set [Eq. 2, 5] \[T19\] \[T20\] \[T21\] \[T22\]
+/// \[T23\].
 #[must_use]
 pub fn states(mech: &Mechanism, input: &Coordinates, n: usize) -> Table {
     let names = input.set.names();
@@ -69,7 +69,7 @@ pub fn states(mech: &Mechanism, input: &Coordinates, n: usize) -> Table {
                 None if !input.continued => mech.home,
                 _ => last,
             };
-            let state = coordinate_sets::state(mech, &input.set, &q, &mask, input.branch, &guess);
+            let state = dependent_coordinates::state(mech, &input.set, &q, &mask, input.branch, &guess);
             let state = checked(mech, state, all_given);
             let jumped = input.continued && state.status == Status::Ok && state.branch * branch < 0.0;
             let status = if jumped { Status::BranchJump } else { state.status };
@@ -179,8 +179,13 @@ impl Operation<6> for FromCoordinates<'_> {
 
 // Parts of the solution, each a function of its own.
 work! {
-    Complete<'a, V: Lanes> { mech: &'a Mechanism, set: &'a Set, q: &'a mut Values<Jet<V>>, branch: f64 } -> Conditions<V> {
-        coordinate_sets::complete(mech, set, q, branch)
+    Complete<'a, V: Lanes> {
+        mech: &'a Mechanism,
+        set: &'a Set,
+        q: &'a mut Values<Jet<V>>,
+        branch: f64,
+    } -> Conditions<V> {
+        dependent_coordinates::complete(mech, set, q, branch)
     }
 }
 work! {
@@ -192,7 +197,7 @@ work! {
         start: &'a Values<f64>,
         wanted: Mask<V>,
     } -> Conditions<V> {
-        coordinate_sets::solve_dependent(mech, set, q, dependent, start, wanted).0
+        dependent_coordinates::solve_dependent(mech, set, q, dependent, start, wanted).0
     }
 }
 work! {
@@ -201,7 +206,8 @@ work! {
     }
 }
 
-/// A state is none where a leg has no frame or points backwards, or where coordinates that were all given break the constraints.
+/// A state is none where a leg has no frame or points backwards, or where coordinates that were all given
+/// break the constraints.
 fn checked(mech: &Mechanism, mut state: CoordinateState, all_given: bool) -> CoordinateState {
     let pose = &state.platform.pose;
     // A root that a constraint has only because a leg has no frame there is none.

@@ -10,7 +10,8 @@ use crate::dynamics::derivatives::{
 use crate::dynamics::force_balance::UnitForceResponse;
 use crate::dynamics::inverse_dynamics::resultant;
 use crate::dynamics::regressor::{self, Regressor};
-use crate::kinematics::coordinate_sets::{DEPENDENT_PIVOTS, MAX_COORDINATES, Set};
+use crate::kinematics::coordinate_sets::{MAX_COORDINATES, Set};
+use crate::kinematics::dependent_coordinates::DEPENDENT_PIVOTS;
 use crate::kinematics::leg;
 use crate::kinematics::rows::RowNumbers;
 use crate::model::mechanism::Mechanism;
@@ -23,9 +24,9 @@ use crate::spatial::{Motion, Wrench};
 /// A field for the forces of all legs and one for the multipliers.
 type Pair = [FieldId; 2];
 
-/// Derivatives of active forces and multipliers by pose, twist and acceleration, by the `given` coordinates of a set
-/// with their rates and second rates, by the numbers of the bodies and by those of the geometry, this for lengths too
-/// \[T56\] \[T57\].
+/// Derivatives of active forces and multipliers by pose, twist and acceleration, by the `given` coordinates
+/// of a set with their rates and second rates, by the numbers of the bodies and by those of the geometry,
+/// this for lengths too \[T56\] \[T57\].
 #[must_use]
 pub fn inverse_dynamics_derivatives(
     mech: &Mechanism,
@@ -83,7 +84,8 @@ struct Derivatives<'a> {
     given: &'a [bool; MAX_COORDINATES],
     /// Numbers of the given coordinates.
     numbers: Vec<usize>,
-    /// The mechanism as it varies with none of its numbers, and with each of the geometry; none if the set is none of it then.
+    /// The mechanism as it varies with none of its numbers, and with each of the geometry; none if the set is
+    /// none of it then.
     still: Varied,
     varied: Option<Vec<Varied>>,
     parameters: usize,
@@ -170,7 +172,8 @@ impl Working<17> for Derivatives<'_> {
     }
 }
 
-/// Leaves numbers only where the coordinates determine the motion, and all are finite, as their `sum` then is.
+/// Leaves numbers only where the coordinates determine the motion, and all are finite, as their `sum` then
+/// is.
 #[inline(always)]
 fn keep<V: Lanes>(
     answers: &mut Answers<'_, 17>,
@@ -222,8 +225,8 @@ fn pair(ids: &[FieldId; 17], k: usize) -> Pair {
     [ids[2 * k], ids[2 * k + 1]]
 }
 
-/// The coefficients of the inertial parameters in active forces and multipliers, and what load and damping add
-/// \[T57\].
+/// The coefficients of the inertial parameters in active forces and multipliers, and what load and damping
+/// add \[T57\].
 #[must_use]
 pub fn regressors(mech: &Mechanism, states: &States, loads: &Loads) -> Table {
     let width = regressor::parameters(mech).len();
@@ -294,7 +297,11 @@ fn set_legs<V: Lanes>(mech: &Mechanism, state: &SolvedDynamics<V>, legs: &mut Ve
 }
 
 work! {
-    SetLegs<'a, V: Lanes> { mech: &'a Mechanism, platform: &'a Motion<V>, legs: &'a mut Vec<leg::LegState<V>> } -> () {
+    SetLegs<'a, V: Lanes> {
+        mech: &'a Mechanism,
+        platform: &'a Motion<V>,
+        legs: &'a mut Vec<leg::LegState<V>>,
+    } -> () {
         legs.clear();
         for leg in &mech.legs {
             legs.push(leg::state(leg, platform));
@@ -322,7 +329,8 @@ work! {
     }
 }
 
-/// One of `width` columns for active forces and multipliers, of rows for all legs (zero for passive ones) and multipliers.
+/// One of `width` columns for active forces and multipliers, of rows for all legs (zero for passive ones) and
+/// multipliers.
 #[inline(always)]
 fn put<V: Lanes, const N: usize>(
     mech: &Mechanism,

@@ -129,8 +129,8 @@ fn put_of_legs<V: Lanes, const N: usize>(
     }
 }
 
-/// Forces on the platform at the ends of two coupled legs, and the torque on their rod, from the multiplier \[T16\].
-/// None for a mechanism without such a pair.
+/// Forces on the platform at the ends of two coupled legs, and the torque on their rod, from the multiplier
+/// \[T16\]. None for a mechanism without such a pair.
 #[must_use]
 pub fn coupled_forces(
     mech: &Mechanism,

@@ -16,9 +16,9 @@ use crate::number::slices::pairs;
 use crate::spatial::Pose;
 use crate::spatial::packed_poses::{Poses, load, put};
 
-/// The pose for each set of lengths of all legs (those of passive legs are not read), in the assembly mode of its
-/// guess: one for each state or one for all. `continued` starts each state from the last one that was solved, and tells
-/// where a motion through the states has passed a singularity \[T27\].
+/// The pose for each set of lengths of all legs (those of passive legs are not read), in the assembly mode of
+/// its guess: one for each state or one for all. `continued` starts each state from the last one that was
+/// solved, and tells where a motion through the states has passed a singularity \[T27\].
 #[must_use]
 pub fn forward_kinematics(
     mech: &Mechanism,
@@ -173,8 +173,9 @@ impl Task for Checks<'_> {
     }
 }
 
-/// A root that a constraint has only because a leg has no frame there is none. Strokes are judged by the lengths
-/// that were asked for, which the pose's own miss by its error: lengths at the very end of a stroke are within it.
+/// A root that a constraint has only because a leg has no frame there is none. Strokes are judged by the
+/// lengths that were asked for, which the pose's own miss by its error: lengths at the very end of a stroke
+/// are within it.
 #[inline(always)]
 fn check<V: Lanes>(mech: &Mechanism, asked: &[LegTarget<V>], pose: &Pose<V>) -> Codes<V> {
     let missed = newton::error(mech, asked, pose);
@@ -201,8 +202,8 @@ fn within_limits_missed<V: Lanes>(
     codes
 }
 
-/// Whether the struts of all actuated sliders lean to the sides that their branches say: only then are the coordinates that
-/// were asked for those of the pose \[T69\].
+/// Whether the struts of all actuated sliders lean to the sides that their branches say: only then are the
+/// coordinates that were asked for those of the pose \[T69\].
 #[inline(always)]
 fn on_branch<V: Lanes>(
     mech: &Mechanism,

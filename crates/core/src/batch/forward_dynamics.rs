@@ -22,8 +22,8 @@ fn read(mech: &Mechanism, poses: &[f64], twists: &[f64], i: usize) -> (Pose<f64>
     (pose, twist, with_twist(mech, &pose, &twist, codes).status())
 }
 
-/// Accelerations of the platform and multipliers of the independent constraints from the forces of all legs; those of
-/// passive legs are not read \[T49\].
+/// Accelerations of the platform and multipliers of the independent constraints from the forces of all legs;
+/// those of passive legs are not read \[T49\].
 #[must_use]
 pub fn forward_dynamics(
     mech: &Mechanism,
@@ -92,7 +92,8 @@ impl Space {
     }
 }
 
-/// Mass, Coriolis and damping matrix, gravity, and the Jacobians of platform and legs \[T49\]-\[T52\].
+/// Mass, Coriolis and damping matrix, gravity, and the Jacobians of platform and legs \[T49\] \[T50\] \[T51\]
+/// \[T52\].
 #[must_use]
 pub fn equations_of_motion(mech: &Mechanism, poses: &[f64], twists: &[f64], space: &Space) -> Table {
     let (n, d) = (poses.len() / 16, space.size());

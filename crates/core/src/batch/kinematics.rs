@@ -203,8 +203,8 @@ impl Operation<21> for Kinematics<'_> {
     }
 }
 
-/// The platform's twist from the rates of all legs; those of passive legs are not read [Eq. 13]. Where actuators are redundant
-/// the legs must agree \[T73\].
+/// The platform's twist from the rates of all legs; those of passive legs are not read [Eq. 13]. Where
+/// actuators are redundant the legs must agree \[T73\].
 #[must_use]
 pub fn platform_twist(mech: &Mechanism, poses: &[f64], rates: &[f64]) -> Table {
     block::table(&PlatformTwist { mech, poses, rates }, poses.len() / 16, [("twist", vec![6])])

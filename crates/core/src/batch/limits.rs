@@ -11,9 +11,9 @@ use crate::model::mechanism::Mechanism;
 use crate::model::status::Status;
 use crate::number::lanes::Lanes;
 
-/// Signed slack of every limit, the same relative to the limit's scale, the number of the limit that binds, and 1 where
-/// all are kept \[T35\]. Forces are those of the motion; where they are not determined their margins are NaN and no limit
-/// binds.
+/// Signed slack of every limit, the same relative to the limit's scale, the number of the limit that binds,
+/// and 1 where all are kept \[T35\]. Forces are those of the motion; where they are not determined their
+/// margins are NaN and no limit binds.
 #[must_use]
 pub fn limits(mech: &Mechanism, states: &States, loads: &Loads) -> Table {
     let count = mech.limits.len();

@@ -61,8 +61,8 @@ pub struct Table {
 #[derive(Clone, Copy, Debug)]
 struct FieldId(usize);
 
-/// Poses (16 numbers each, rows of the homogeneous matrix), twists and accelerations (6 each, or none at all where
-/// everything is at rest) of the states.
+/// Poses (16 numbers each, rows of the homogeneous matrix), twists and accelerations (6 each, or none at all
+/// where everything is at rest) of the states.
 #[derive(Clone, Copy, Debug)]
 pub struct States<'a> {
     pub poses: &'a [f64],

@@ -10,9 +10,9 @@ use crate::model::mechanism::Mechanism;
 use crate::model::status::Status;
 use crate::number::lanes::Lanes;
 
-/// Reactions of all joints on the links on their platform's side, each at its joint's point \[T44\]-\[T48\],
-/// in the order of [`joint_reactions::joints`]. Which components are determinate is given by 1 and 0.
-/// `scale`, m, is what torques are divided by where the least sum of squares is sought.
+/// Reactions of all joints on the links on their platform's side, each at its joint's point \[T44\] \[T45\]
+/// \[T46\] \[T47\] \[T48\], in the order of [`joint_reactions::joints`]. Which components are determinate is
+/// given by 1 and 0. `scale`, m, is what torques are divided by where the least sum of squares is sought.
 #[must_use]
 pub fn joint_reactions(mech: &Mechanism, states: &States, loads: &Loads, scale: f64) -> Table {
     let joints = joint_reactions::joints(mech);

@@ -3,7 +3,8 @@
 use super::block::{self, Answers, At, Codes, Operation, Pieces};
 use super::checks::{any_pose, finite, kept, reached, read_pose};
 use super::{FieldId, Table};
-use crate::kinematics::coordinate_sets::{self, Set};
+use crate::kinematics::coordinate_sets::Set;
+use crate::kinematics::dependent_coordinates;
 use crate::mobility::singularity;
 use crate::mobility::singularity_distance::{self, SingularitySearch};
 use crate::model::mechanism::Mechanism;
@@ -17,7 +18,8 @@ fn read(mech: &Mechanism, poses: &[f64], i: usize) -> (Pose<f64>, Status) {
     (pose, kept(mech, &pose, reached(mech, &pose, codes)).status())
 }
 
-/// Singular values of the leg Jacobian on the twists that the constraints allow, for the length `scale` \[T24\].
+/// Singular values of the leg Jacobian on the twists that the constraints allow, for the length `scale`
+/// \[T24\].
 #[must_use]
 pub fn conditioning(mech: &Mechanism, poses: &[f64], scale: f64) -> Table {
     let n = poses.len() / 16;
@@ -66,8 +68,9 @@ fn known(determinant: f64) -> Status {
     if determinant.is_finite() { Status::Ok } else { Status::Singular }
 }
 
-/// Determinant, singular values, kind and uncontrolled twist at each pose \[T30\]-\[T33\]. At a pose where a leg has no
-/// direction the status is singular, and only the kind and the measures of legs and constraints stand.
+/// Determinant, singular values, kind and uncontrolled twist at each pose \[T30\] \[T31\] \[T32\] \[T33\]. At
+/// a pose where a leg has no direction the status is singular, and only the kind and the measures of legs and
+/// constraints stand.
 #[must_use]
 pub fn singularities(mech: &Mechanism, poses: &[f64], scale: f64, tolerance: f64) -> Table {
     let (n, legs) = (poses.len() / 16, mech.legs.len());
@@ -125,13 +128,13 @@ pub fn singularities(mech: &Mechanism, poses: &[f64], scale: f64, tolerance: f64
 #[must_use]
 pub fn searched_coordinates(mech: &Mechanism, set: &Set, names: Option<&[String]>) -> Vec<bool> {
     names.map_or_else(
-        || coordinate_sets::best_given(mech, set),
+        || dependent_coordinates::best_given(mech, set),
         |names| set.names().iter().map(|name| names.iter().any(|n| n == name)).collect(),
     )
 }
 
-/// For each given coordinate its value at the nearest singular poses below and above, their kinds, and how far
-/// poses were looked at \[T34\].
+/// For each given coordinate its value at the nearest singular poses below and above, their kinds, and how
+/// far poses were looked at \[T34\].
 #[must_use]
 pub fn nearest_singular(mech: &Mechanism, poses: &[f64], search: &SingularitySearch) -> Table {
     let n = poses.len() / 16;

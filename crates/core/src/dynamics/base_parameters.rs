@@ -23,7 +23,8 @@ const SURPLUS: usize = 3;
 /// Spread about home of the random poses: in characteristic lengths and radians.
 const SPREAD: f64 = 0.5;
 
-/// Pivot ratio of the Jacobian below which a drawn pose is passed over: forces there are large and say little.
+/// Pivot ratio of the Jacobian below which a drawn pose is passed over: forces there are large and say
+/// little.
 const PIVOTS: f64 = 1e-3;
 
 /// Draws for each state that is needed.
@@ -114,8 +115,8 @@ fn random_state(mech: &Mechanism, draw: &mut Random) -> Option<Motion<f64>> {
     (regular > PIVOTS).then_some(Motion { pose, twist, acceleration: Acceleration::new(v, omega) })
 }
 
-/// Columns that are no combination of those before them, by orthogonalisation in order, and for every column what is
-/// left of it.
+/// Columns that are no combination of those before them, by orthogonalisation in order, and for every column
+/// what is left of it.
 fn independent_columns(m: &DMatrix<f64>) -> (Vec<usize>, Vec<f64>) {
     let largest = m.column_iter().map(|c| c.norm()).fold(0.0, f64::max);
     let mut basis: Vec<DVector<f64>> = Vec::new();

@@ -7,7 +7,8 @@
 use crate::assembly::geometric_parameters::{self, GeometricParameter};
 use crate::dynamics::force_balance::UnitForceResponse;
 use crate::dynamics::inverse_dynamics::{leg_wrench, load_in_base, own_wrench};
-use crate::kinematics::coordinate_sets::{self, ImplicitSensitivity, Set, Values, Variation, Varying};
+use crate::kinematics::coordinate_sensitivity::{ImplicitSensitivity, Variation, Varying};
+use crate::kinematics::coordinate_sets::{self, Set, Values};
 use crate::kinematics::leg;
 use crate::kinematics::rows::{Row, RowNumbers, for_each_row};
 use crate::model::mechanism::{Leg, Mechanism};
@@ -22,7 +23,8 @@ use crate::spatial::{Acceleration, Motion, Pose, Twist, Vec3, Wrench};
 /// base through o), six of the twist, six of the acceleration.
 pub const DIRECTIONS: usize = 18;
 
-/// Inverse dynamics at a state, solved. Forces and multipliers, or how they change, stand in the order of J's rows.
+/// Inverse dynamics at a state, solved. Forces and multipliers, or how they change, stand in the order of J's
+/// rows.
 #[derive(Clone, Copy)]
 pub(crate) struct SolvedDynamics<'a, V: Real> {
     pub platform: Motion<V>,
@@ -35,8 +37,8 @@ pub(crate) struct SolvedDynamics<'a, V: Real> {
     pub response: &'a UnitForceResponse<V>,
 }
 
-/// What a variation takes the balance off by, forces and multipliers kept: the wrench on the platform, and where actuators are
-/// redundant what each row of J then does to y \[T74\].
+/// What a variation takes the balance off by, forces and multipliers kept: the wrench on the platform, and
+/// where actuators are redundant what each row of J then does to y \[T74\].
 struct Imbalance<'a, 'b, V: Real> {
     at: &'a SolvedDynamics<'a, V>,
     wrench: Wrench<Dual<V>>,
@@ -94,8 +96,9 @@ impl<'a, 'b, V: Lanes> Imbalance<'a, 'b, V> {
 }
 
 work! {
-    /// Derivatives of active forces and multipliers by the motion in each direction, the other numbers kept: one column for each
-    /// direction. `off` is room for a number of each row where actuators are redundant, else empty.
+    /// Derivatives of active forces and multipliers by the motion in each direction, the other numbers kept:
+    /// one column for each direction. `off` is room for a number of each row where actuators are redundant,
+    /// else empty.
     pub(crate) ByMotion<'a, 'b, V: Lanes> {
         mech: &'a Mechanism,
         at: &'a SolvedDynamics<'b, V>,
@@ -238,8 +241,8 @@ impl<V: Lanes> VariedCoordinates<V> {
         V::apart(Varying { mech: &still.mech, set: &still.set, q: &self.q, number: Some(number) })
     }
 
-    /// The derivative by a given coordinate that these vary with, or by its rate or second rate (order 1 or 2), the others
-    /// of these kept and dependent coordinates following.
+    /// The derivative by a given coordinate that these vary with, or by its rate or second rate (order 1 or
+    /// 2), the others of these kept and dependent coordinates following.
     #[inline(always)]
     pub(crate) fn put_derivative(
         &self,
@@ -278,7 +281,8 @@ work! {
         platform: &'a Motion<V>,
     } -> VariedCoordinates<V> {
         let q = coordinate_sets::along(mech, set, platform);
-        VariedCoordinates { q, pose: platform.jets(), following: ImplicitSensitivity::at(&still.mech, &still.set, &q, given) }
+        let following = ImplicitSensitivity::at(&still.mech, &still.set, &q, given);
+        VariedCoordinates { q, pose: platform.jets(), following }
     }
 }
 
@@ -328,8 +332,9 @@ impl Varied {
 }
 
 work! {
-    /// Derivatives of active forces, multipliers and of the lengths of all legs by a number of the geometry, the given
-    /// coordinates, their rates and second rates kept and dependent coordinates following. `off` as in [`ByMotion`].
+    /// Derivatives of active forces, multipliers and of the lengths of all legs by a number of the geometry,
+    /// the given coordinates, their rates and second rates kept and dependent coordinates following. `off` as
+    /// in [`ByMotion`].
     pub(crate) ByGeometry<'a, 'b, V: Lanes> {
         varied: &'a Varied,
         at: &'a SolvedDynamics<'b, V>,

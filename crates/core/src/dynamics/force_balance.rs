@@ -1,5 +1,6 @@
-//! Active forces and multipliers that balance a wrench on the platform, `Aᵀ f + Cᵀ λ = -W` [Eq. 43]: by Gaussian elimination
-//! where J is square \[T15\], the forces of least norm where actuators are redundant \[T72\].
+//! Active forces and multipliers that balance a wrench on the platform, `Aᵀ f + Cᵀ λ = -W` [Eq. 43]: by
+//! Gaussian elimination where J is square \[T15\], the forces of least norm where actuators are redundant
+//! \[T72\].
 
 use crate::dynamics::inverse_dynamics::{Balance, transposed};
 use crate::kinematics::jacobian::scaled_jacobian;
@@ -34,7 +35,8 @@ impl<V: Lanes> ForceSolver<V> {
         }
     }
 
-    /// Finds the forces; tells how regular J is: its pivot ratio, or a lower bound of its singular values' ratio.
+    /// Finds the forces; tells how regular J is: its pivot ratio, or a lower bound of its singular values'
+    /// ratio.
     #[inline(always)]
     pub fn solve(&mut self, mech: &Mechanism, pose: &Pose<V>, balance: Balance<V>) -> V {
         match &mut self.redundant {
@@ -74,8 +76,8 @@ work! {
     }
 }
 
-/// Forces and multipliers that balance a unit of each force and torque on the platform \[T15\]; where actuators are
-/// redundant also those for a unit that each row of J is off by \[T74\].
+/// Forces and multipliers that balance a unit of each force and torque on the platform \[T15\]; where
+/// actuators are redundant also those for a unit that each row of J is off by \[T74\].
 pub struct UnitForceResponse<V> {
     /// The columns, where J is square.
     square: Matrix6<V>,

@@ -1,12 +1,14 @@
 //! Forward dynamics: the acceleration for given forces, and the terms of the equations of motion
-//! \[T49\]-\[T52\].
+//! \[T49\] \[T50\] \[T51\] \[T52\].
 //!
-//! There are no equations of links here: the resultant of [`dynamics`](crate::dynamics::inverse_dynamics) is affine in the
-//! acceleration and, damping aside, quadratic in the twist, so that every term is a difference of resultants.
+//! There are no equations of links here: the resultant of [`dynamics`](crate::dynamics::inverse_dynamics) is
+//! affine in the acceleration and, damping aside, quadratic in the twist, so that every term is a difference
+//! of resultants.
 
 use crate::dynamics::inverse_dynamics::{damping_wrench, leg_wrench, own_wrench, resultant};
 use crate::kinematics::constraint;
-use crate::kinematics::coordinate_sets::{self, MAX_COORDINATES, Set, Values};
+use crate::kinematics::coordinate_sets::{MAX_COORDINATES, Set, Values};
+use crate::kinematics::dependent_coordinates;
 use crate::kinematics::leg;
 use crate::kinematics::quadratic_forms::quadratic;
 use crate::kinematics::rows::Matrix6;
@@ -32,12 +34,13 @@ pub struct Driven<T: Real> {
     pub acceleration: Acceleration<T>,
     /// Of the independent constraints; the rest are zero.
     pub multipliers: [T; MAX_CONSTRAINTS],
-    /// Pivot ratio of the equations: zero or NaN where masses and constraints do not determine the acceleration.
+    /// Pivot ratio of the equations: zero or NaN where masses and constraints do not determine the
+    /// acceleration.
     pub pivots: T::Value,
 }
 
-/// The acceleration that keeps the constraints, and their multipliers, from the forces of the actuated legs, in the
-/// order of the Jacobian's rows \[T49\].
+/// The acceleration that keeps the constraints, and their multipliers, from the forces of the actuated legs,
+/// in the order of the Jacobian's rows \[T49\].
 #[inline(always)]
 pub fn forward_dynamics<T: Real>(
     mech: &Mechanism,
@@ -174,8 +177,8 @@ fn inertia<T: Real>(mech: &Mechanism, still: &Motion<T>, weight: Wrench<T>, a: &
     weight - resultant(mech, &moved, Wrench::zero())
 }
 
-/// The terms of `M q'' + C q' + D q' + g = Jᵀ f + Sᵀ W/η` in some velocities q' of the platform \[T50\]-\[T52\]. The first
-/// `count` rows and columns are in use.
+/// The terms of `M q'' + C q' + D q' + g = Jᵀ f + Sᵀ W/η` in some velocities q' of the platform \[T50\]
+/// \[T51\] \[T52\]. The first `count` rows and columns are in use.
 #[derive(Clone, Copy, Debug)]
 pub struct Equations<T> {
     pub count: usize,
@@ -192,7 +195,8 @@ pub struct Equations<T> {
 pub fn platform_equations<T: Real>(mech: &Mechanism, pose: &Pose<T>, twist: &Twist<T>) -> Equations<T> {
     let motion = |v: &[T; 6]| coasting(pose, &Twist::from_array(*v));
     let mut e = equations(mech, 6, &twist.array(), motion);
-    // Angular velocities are no rates of coordinates: ½ [h × ω_j + ω × h_j] with the angular momentum h = (M V)_ω.
+    // Angular velocities are no rates of coordinates: ½ [h × ω_j + ω × h_j] with the angular momentum h = (M
+    // V)_ω.
     let momentum = |v: [T; 6]| {
         let along = |i: usize| (0..6).fold(T::zero(), |sum, j| e.mass[i][j].mul_add(v[j], sum));
         Vec3::new(along(3), along(4), along(5))
@@ -210,7 +214,8 @@ pub fn platform_equations<T: Real>(mech: &Mechanism, pose: &Pose<T>, twist: &Twi
     e
 }
 
-/// The terms in the given coordinates of a set, dependent ones following \[T52\]; `q` are all its numbers at the pose.
+/// The terms in the given coordinates of a set, dependent ones following \[T52\]; `q` are all its numbers at
+/// the pose.
 ///
 /// # Errors
 /// The status of a state that the coordinates do not determine.
@@ -229,7 +234,7 @@ pub fn coordinate_equations(
         for (&k, &rate) in free.iter().zip(rates) {
             jets[k].d = rate;
         }
-        coordinate_sets::state(mech, set, &jets, &mask, branch, pose)
+        dependent_coordinates::state(mech, set, &jets, &mask, branch, pose)
     };
     let still = state(&[0.0; 6]);
     if still.status != Status::Ok {
@@ -286,7 +291,8 @@ fn equations<T: Real>(
         let braked = weight + damping(&moving.twist);
         braked - resultant(mech, &moving, Wrench::zero())
     };
-    // The polar form ¼ [c(q' + s e_j) - c(q' - s e_j)]/s, both parts scaled so that what they add is as large as weights.
+    // The polar form ¼ [c(q' + s e_j) - c(q' - s e_j)]/s, both parts scaled so that what they add is as large
+    // as weights.
     let brisk = T::lit((mech.characteristic_length * STANDARD_GRAVITY).sqrt());
     let pace = brisk / size(mech, &motion(rates).twist);
     let polar = |j: usize| {

@@ -1,5 +1,6 @@
-//! Inverse dynamics by virtual power: every link's weight and inertia is carried to the platform's twist by the
-//! transpose of its own Jacobian, then actuators and constraints balance the sum [Eq. 40-43] \[T13\]-\[T17\].
+//! Inverse dynamics by virtual power: every link's weight and inertia is carried to the platform's twist by
+//! the transpose of its own Jacobian, then actuators and constraints balance the sum [Eq. 40, 41, 42, 43]
+//! \[T13\] \[T14\] \[T15\] \[T16\] \[T17\].
 
 use crate::kinematics::jacobian::scaled;
 use crate::kinematics::leg;
@@ -111,8 +112,8 @@ pub(crate) fn links_wrench<T: Real>(
     }
 }
 
-/// Weight and inertial force of a link of a leg \[T8\] \[T13\], and its torque about the link's reference point;
-/// `push` is gravity less the acceleration of that point.
+/// Weight and inertial force of a link of a leg \[T8\] \[T13\], and its torque about the link's reference
+/// point; `push` is gravity less the acceleration of that point.
 #[inline(always)]
 fn turning_force<T: Real>(body: &Body, turn: &leg::LegRotation<T>, push: Vec3<T>) -> (Vec3<T>, Vec3<T>) {
     let center = Vec3::lift(body.center);
@@ -296,8 +297,8 @@ pub fn energy<T: Real>(mech: &Mechanism<impl Constant<T>>, pose: &Pose<T>, twist
     sum
 }
 
-/// Kinetic and potential energy with those of one more link: its axes, angular velocity, and velocity and place of its
-/// mass centre.
+/// Kinetic and potential energy with those of one more link: its axes, angular velocity, and velocity and
+/// place of its mass centre.
 #[inline(always)]
 fn with_energy<T: Real>(
     (kinetic, potential): (T, T),
@@ -313,7 +314,8 @@ fn with_energy<T: Real>(
     (kinetic + moving, potential - Vec3::lift(mech.gravity).dot(place) * mass)
 }
 
-/// Forces along c_1 that two coupled legs put on the platform at their ends, and the torque T_c about the rod's line.
+/// Forces along c_1 that two coupled legs put on the platform at their ends, and the torque T_c about the
+/// rod's line.
 #[derive(Clone, Copy, Debug)]
 pub struct Coupled<T> {
     pub forces: [T; 2],

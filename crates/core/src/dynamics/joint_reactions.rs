@@ -1,9 +1,10 @@
 //! Reactions of all joints: the wrench of the link on the base's side on the link on the platform's side
-//! \[T44\]-\[T48\].
+//! \[T44\] \[T45\] \[T46\] \[T47\] \[T48\].
 //!
-//! The wrenches of the legs on the platform are the unknowns; every other reaction follows from them link by link,
-//! from the platform down. What they must satisfy is that no joint carries what it leaves free, and that the platform is
-//! balanced. Where constraints are redundant this leaves self-stresses open, which two rules choose.
+//! The wrenches of the legs on the platform are the unknowns; every other reaction follows from them link by
+//! link, from the platform down. What they must satisfy is that no joint carries what it leaves free, and
+//! that the platform is balanced. Where constraints are redundant this leaves self-stresses open, which two
+//! rules choose.
 
 use crate::dynamics::inverse_dynamics::{inertial_force, platform_wrench, rod_wrench, turning_torque};
 use crate::kinematics::leg;
@@ -25,8 +26,8 @@ pub struct LinkJoint {
     pub(crate) free: Vec<usize>,
 }
 
-/// All joints: the rods' bearings, then for each leg base joint, prismatic joint and platform joint. A slider's prismatic
-/// joint lies below its base joint, between base and carriage.
+/// All joints: the rods' bearings, then for each leg base joint, prismatic joint and platform joint. A
+/// slider's prismatic joint lies below its base joint, between base and carriage.
 #[must_use]
 pub fn joints(mech: &Mechanism) -> Vec<LinkJoint> {
     let mut all = Vec::new();
@@ -41,7 +42,8 @@ pub fn joints(mech: &Mechanism) -> Vec<LinkJoint> {
         let (ground, below) = (leg.rod.map_or_else(|| "base".into(), rod_name), leg.base_kind());
         let [first, second] = leg.links().map(|link| format!("{link} {}", leg.name));
         let above = leg.platform.kind;
-        // The prismatic joint carries the active force along its direction, and nothing there if it is passive.
+        // The prismatic joint carries the active force along its direction, and nothing there if it is
+        // passive.
         let active = [leg.drive.kind().active];
         let slide: &[usize] = if leg.actuated { &[] } else { &active };
         let [base_joint, prismatic] = leg.drive.between([ground, first, second.clone()]);
@@ -129,8 +131,9 @@ fn universal<T: Real>(u: Vec3<T>, n: Vec3<T>) -> Mat3<T> {
     Mat3::from_columns(u, third.cross(u), third)
 }
 
-/// Weight, inertia and load of the links: at o for the platform (divided by the efficiency, as in [Eq. 43]), at a rod's
-/// point, at B for a cylinder and at b for a piston, at its foot for a carriage and at b for a strut.
+/// Weight, inertia and load of the links: at o for the platform (divided by the efficiency, as in [Eq. 43]),
+/// at a rod's point, at B for a cylinder and at b for a piston, at its foot for a carriage and at b for a
+/// strut.
 #[derive(Clone, Debug)]
 pub struct Given<T> {
     pub platform: Wrench<T>,
@@ -188,8 +191,8 @@ fn link_wrench<T: Real>(
     Wrench::new(force, center.offset.cross(force) + torque)
 }
 
-/// The reactions of all joints, each at its own point in base axes, from those of the platform joints: every link but the
-/// platform is balanced \[T45\].
+/// The reactions of all joints, each at its own point in base axes, from those of the platform joints: every
+/// link but the platform is balanced \[T45\].
 #[must_use]
 pub fn reactions<T: Real>(
     mech: &Mechanism,

@@ -4,5 +4,7 @@ pub mod force_balance;
 pub mod forward_dynamics;
 pub mod inverse_dynamics;
 pub mod joint_reactions;
+pub mod leg_balance;
 pub mod regressor;
 pub mod self_stress;
+pub mod stress_choice;

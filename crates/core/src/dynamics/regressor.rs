@@ -21,7 +21,8 @@ pub enum Link {
 /// Numbers of a body: by their first moments or by mass centre and inertia about it.
 pub const NUMBERS: usize = 10;
 
-/// m, m c, and the entries of the inertia about the origin of the link's axes: those that forces are linear in.
+/// m, m c, and the entries of the inertia about the origin of the link's axes: those that forces are linear
+/// in.
 const STANDARD: [&str; NUMBERS] =
     ["m", "mc_x", "mc_y", "mc_z", "I_xx", "I_xy", "I_xz", "I_yy", "I_yz", "I_zz"];
 
@@ -241,8 +242,8 @@ impl Regressor {
         (load + inverse_dynamics::damping_wrench(mech, twist)) * T::lit(1.0 / mech.efficiency)
     }
 
-    /// From the columns of Y, one after the other, to the k-th of the derivatives by mass, mass centre, and inertia about it
-    /// \[T57\].
+    /// From the columns of Y, one after the other, to the k-th of the derivatives by mass, mass centre, and
+    /// inertia about it \[T57\].
     #[inline(always)]
     pub(crate) fn put_by_bodies<T: Real>(&self, columns: &[T], k: usize, sum: &mut [T]) {
         let width = sum.len();

@@ -6,35 +6,26 @@ use crate::dynamics::force_balance::ForceSolver;
 use crate::dynamics::joint_reactions::{
     Given, JointFrame, LinkJoint, constraint_wrench, pure, put_places, put_reactions, put_unbalanced,
 };
+use crate::dynamics::leg_balance::{LegBalance, SolveLeg};
+use crate::dynamics::stress_choice::{Choice, MakeLeast, OPEN, TurnStresses};
 use crate::kinematics::idle;
-use crate::model::drive::Drive;
-use crate::model::joint::JointKind;
 use crate::model::mechanism::Mechanism;
-use crate::number::lanes::{Lanes, any};
+use crate::number::lanes::Lanes;
 use crate::number::real::{Mask, Real};
 use crate::number::slices::{self, pairs};
 use crate::number::work::work;
 use crate::numerics::householder::Householder;
 use crate::spatial::{Motion, Pose, Vec3, Wrench};
 
-/// Least to greatest singular value of the platform's and the rods' balances below which the pose is singular.
+/// Least to greatest singular value of the platform's and the rods' balances below which the pose is
+/// singular.
 const SINGULAR: f64 = 1e-12;
 
 /// Largest residual of the equilibrium equations, relative to the reactions.
 const RESIDUAL: f64 = 1e-9;
 
-/// A component (torques divided by Λ) that no self-stress of size one changes by more is determinate: poses may miss their
-/// constraints by as much.
-const OPEN: f64 = 1e-6;
-
-/// Cosine of the angle between the couples of two self-stresses that counts as square, and the share of all couples that
-/// is rounding.
-const SQUARE: f64 = 1e-15;
-
-/// Far more rotations of all pairs than any self-stresses need.
-const SWEEPS: usize = 60;
-
-/// Reactions of all joints in the order of [`joints`](crate::dynamics::joint_reactions::joints), each at its joint's point in base axes.
+/// Reactions of all joints in the order of [`joints`](crate::dynamics::joint_reactions::joints), each at its
+/// joint's point in base axes.
 #[derive(Clone, Debug)]
 pub struct Reactions {
     pub places: Vec<JointFrame<f64>>,
@@ -49,8 +40,8 @@ pub struct Reactions {
     pub constraint: Wrench<f64>,
 }
 
-/// All reactions that keep up a motion under load, or none at a singular pose. Torques count in the least sum of squares by
-/// `scale`, m.
+/// All reactions that keep up a motion under load, or none at a singular pose. Torques count in the least sum
+/// of squares by `scale`, m.
 #[must_use]
 pub fn solve(
     mech: &Mechanism,
@@ -77,9 +68,9 @@ pub(crate) struct Solver<'a, V> {
     mech: &'a Mechanism,
     joints: &'a [LinkJoint],
     legs: Vec<LegBalance<V>>,
-    /// Wrenches on the platform that hold what nothing in the mechanism does: at o, torques divided by the characteristic
-    /// length.
-    props: Vec<Wrench<V>>,
+    /// Wrenches on the platform that hold what nothing in the mechanism does: at o, torques divided by the
+    /// characteristic length.
+    supports: Vec<Wrench<V>>,
     given: Given<V>,
     none: Given<V>,
     /// The balances of platform and rods, unknown being the shares of what the legs can carry.
@@ -99,103 +90,9 @@ pub(crate) struct Solver<'a, V> {
     pub constraint: Wrench<V>,
 }
 
-/// Wrenches of a leg on the platform, at its b in base axes, torques divided by the characteristic length:
-/// the particular one that balances the given forces of the leg, and a basis of those that its joints
-/// transmit without any.
-struct LegBalance<V> {
-    /// Components that its joints cannot transmit: the joint, from base to platform, and the component.
-    free: Vec<(usize, usize)>,
-    system: Householder<V>,
-    /// The first of its columns in the whole.
-    first: usize,
-    /// The active force, where it is given.
-    push: V,
-    particular: Wrench<V>,
-    carried: Vec<Wrench<V>>,
-}
-
-impl<V: Lanes> LegBalance<V> {
-    fn new(joints: &[LinkJoint], first: usize, pushed: bool) -> Self {
-        let mut free: Vec<_> = joints
-            .iter()
-            .enumerate()
-            .flat_map(|(j, joint)| joint.free.iter().map(move |&k| (j, k)))
-            .collect();
-        if joints[0].kind == JointKind::Spherical.letter() && joints[2].kind == joints[0].kind {
-            // Rotation about itself is free at either end, and is one motion: neither end can hold it.
-            free.retain(|&at| at != (0, 4));
-        }
-        if pushed {
-            free.push((1, 1));
-        }
-        let carried = vec![Wrench::zero(); 6 - free.len()];
-        LegBalance {
-            system: Householder::new(free.len(), 6),
-            free,
-            first,
-            push: V::zero(),
-            particular: Wrench::zero(),
-            carried,
-        }
-    }
-
-    /// A joint carries nothing where it is free: no power along its motion there, seen at b \[T44\].
-    #[inline(always)]
-    fn solve(
-        &mut self,
-        drive: Drive,
-        places: &[JointFrame<V>],
-        [first, second]: [Wrench<V>; 2],
-        length: f64,
-    ) {
-        let end = places[2].point;
-        // What is given above the joint, at its point.
-        let at_base = second.moved(end - places[0].point);
-        let both = pure(at_base + first, length);
-        let given = if drive.moves_foot() {
-            [pure(at_base, length), both, Wrench::zero()]
-        } else {
-            [both, pure(second, length), Wrench::zero()]
-        };
-        let mut rhs = [V::zero(); 6];
-        for row in 0..self.free.len() {
-            let (j, k) = self.free[row];
-            let (axis, lever) = (places[j].axes.0[k % 3], end - places[j].point);
-            let motion = if k < 3 {
-                Wrench::new(axis, Vec3::zero())
-            } else {
-                Wrench::new(axis.cross(lever).scale(1.0 / length), axis)
-            };
-            let entries = motion.array();
-            for column in 0..6 {
-                self.system.set(row, column, entries[column]);
-            }
-            // The one force that a joint does not leave free but is given is that of an actuator.
-            rhs[row] = if k < 3 { axis.dot(given[j].force) + self.push } else { axis.dot(given[j].torque) };
-        }
-        self.system.factor();
-        self.system.solve(&mut rhs);
-        self.particular = Wrench::from_array(rhs);
-        for k in 0..self.carried.len() {
-            let mut x = [V::zero(); 6];
-            self.system.null_vector(k, &mut x);
-            self.carried[k] = Wrench::from_array(x);
-        }
-    }
-
-    /// The wrench with the given shares of what it carries.
-    #[inline(always)]
-    fn with(&self, particular: bool, shares: &[V], length: f64) -> Wrench<V> {
-        let mut sum = if particular { self.particular } else { Wrench::zero() };
-        for k in 0..self.carried.len() {
-            sum = sum + self.carried[k] * shares[self.first + k];
-        }
-        Wrench::new(sum.force, sum.torque.scale(length))
-    }
-}
-
 impl<'a, V: Lanes> Solver<'a, V> {
-    /// Room for the states of a mechanism; `scale`, m, is what torques are divided by in the least sum of squares.
+    /// Room for the states of a mechanism; `scale`, m, is what torques are divided by in the least sum of
+    /// squares.
     pub(crate) fn new(mech: &'a Mechanism, joints: &'a [LinkJoint], scale: f64) -> Self {
         let (rods, mut count, mut legs) = (mech.rods.len(), 0, Vec::new());
         for i in 0..mech.legs.len() {
@@ -206,15 +103,15 @@ impl<'a, V: Lanes> Solver<'a, V> {
         }
         // Given forces of all actuators hold the platform in all its degrees of freedom, the others in the
         // idle ones.
-        let props = if mech.is_redundant() { mech.dof() } else { mech.idle.len() };
-        count += props;
+        let supports = if mech.is_redundant() { mech.dof() } else { mech.idle.len() };
+        count += supports;
         let (all, rows) = (joints.len(), 6 + rods);
         let free: usize = joints.iter().map(|joint| joint.free.len()).sum();
         Solver {
             mech,
             joints,
             legs,
-            props: vec![Wrench::zero(); props],
+            supports: vec![Wrench::zero(); supports],
             given: Given::none(mech),
             none: Given::none(mech),
             // Fewer unknowns than equations has a design that actuators do not control: it has no answer.
@@ -233,19 +130,20 @@ impl<'a, V: Lanes> Solver<'a, V> {
         }
     }
 
-    /// Finds all reactions that keep up a motion under load; tells where there are any, which is not at singular poses.
+    /// Finds all reactions that keep up a motion under load; tells where there are any, which is not at
+    /// singular poses.
     #[inline(always)]
     pub(crate) fn solve(&mut self, platform: &Motion<V>, load: Wrench<V>) -> Mask<V> {
         let (mech, pose) = (self.mech, &platform.pose);
         V::apart(SetGiven { given: &mut self.given, mech, platform, load });
         let Some(forces) = &mut self.forces else {
             for k in 0..mech.idle.len() {
-                self.props[k] = Wrench::new(Vec3::zero(), idle::axis(&mech.idle[k], pose));
+                self.supports[k] = Wrench::new(Vec3::zero(), idle::axis(&mech.idle[k], pose));
             }
             return self.solve_given(pose);
         };
         // Redundant actuators push with their least forces \[T72\], which leave the platform's degrees of
-        // freedom nothing to hold: what the props hold shows as an error.
+        // freedom nothing to hold: what the supports hold shows as an error.
         let regular = forces.solve_motion(mech, platform, load);
         let mut row = 0;
         for (leg, balance) in pairs(&mech.legs, &mut self.legs) {
@@ -256,10 +154,10 @@ impl<'a, V: Lanes> Solver<'a, V> {
             self.given.platform = self.given.platform + idle::row(idle, pose) * *torque;
         }
         let mut twists = [[V::zero(); 6]; 6];
-        let count = self.props.len();
+        let count = self.supports.len();
         forces.put_freedoms(&mut twists[..count]);
-        for (prop, twist) in pairs(&mut self.props, twists) {
-            *prop = Wrench::from_array(twist);
+        for (support, twist) in pairs(&mut self.supports, twists) {
+            *support = Wrench::from_array(twist);
         }
         let holds = self.solve_given(pose);
         let known = V::select(holds, V::one(), V::zero());
@@ -306,21 +204,21 @@ impl<'a, V: Lanes> Solver<'a, V> {
     /// Takes the torques of the fictitious supports of local degrees of freedom as given from now on.
     #[inline(always)]
     fn add_idle_torques(&mut self) {
-        let (length, first) = (self.mech.characteristic_length, self.props_from());
-        for k in 0..self.props.len() {
-            let Wrench { force, torque } = self.props[k] * self.unknowns[first + k];
+        let (length, first) = (self.mech.characteristic_length, self.supports_from());
+        for k in 0..self.supports.len() {
+            let Wrench { force, torque } = self.supports[k] * self.unknowns[first + k];
             self.given.platform = self.given.platform + Wrench::new(force, torque.scale(length));
         }
     }
 
     /// The column of the first fictitious support.
     #[inline(always)]
-    fn props_from(&self) -> usize {
+    fn supports_from(&self) -> usize {
         self.legs.last().map_or(0, |leg| leg.first + leg.carried.len())
     }
 
-    /// The balances of the platform at o and of the rods about their lines; those of the legs hold whatever their shares
-    /// are \[T46\].
+    /// The balances of the platform at o and of the rods about their lines; those of the legs hold whatever
+    /// their shares are \[T46\].
     #[inline(always)]
     fn set_up(&mut self, o: Vec3<V>) {
         let (mech, length) = (self.mech, self.mech.characteristic_length);
@@ -332,11 +230,11 @@ impl<'a, V: Lanes> Solver<'a, V> {
         for row in 0..6 {
             self.unknowns[row] = -own[row];
         }
-        let first = self.props_from();
-        for k in 0..self.props.len() {
-            let prop = self.props[k].array();
+        let first = self.supports_from();
+        for k in 0..self.supports.len() {
+            let support = self.supports[k].array();
             for row in 0..6 {
-                self.system.set(row, first + k, prop[row]);
+                self.system.set(row, first + k, support[row]);
             }
             for r in 0..rods {
                 self.system.set(6 + r, first + k, V::zero());
@@ -419,7 +317,8 @@ impl<'a, V: Lanes> Solver<'a, V> {
                 let stress = self.choice.stresses[s * self.joints.len() + j];
                 let parts = pure(stress, length).array();
                 let seen_parts = pure(self.places[j].seen(stress), length).array();
-                // The root of the sum is the most that a self-stress of size one can have, whatever the basis.
+                // The root of the sum is the most that a self-stress of size one can have, whatever the
+                // basis.
                 for k in 0..6 {
                     base[k] = parts[k].mul_add(parts[k], base[k]);
                     seen[k] = seen_parts[k].mul_add(seen_parts[k], seen[k]);
@@ -436,24 +335,22 @@ impl<'a, V: Lanes> Solver<'a, V> {
 
 // Parts of the solution, each a function of its own.
 work! {
-    SetGiven<'a, V: Lanes> { given: &'a mut Given<V>, mech: &'a Mechanism, platform: &'a Motion<V>, load: Wrench<V> } -> () {
+    SetGiven<'a, V: Lanes> {
+        given: &'a mut Given<V>,
+        mech: &'a Mechanism,
+        platform: &'a Motion<V>,
+        load: Wrench<V>,
+    } -> () {
         given.set(mech, platform, load);
     }
 }
 work! {
-    SetPlaces<'a, V: Lanes> { mech: &'a Mechanism, pose: &'a Pose<V>, places: &'a mut [JointFrame<V>] } -> () {
-        put_places(mech, pose, places);
-    }
-}
-work! {
-    SolveLeg<'a, V: Lanes> {
-        leg: &'a mut LegBalance<V>,
-        drive: Drive,
-        places: &'a [JointFrame<V>],
-        given: [Wrench<V>; 2],
-        length: f64,
+    SetPlaces<'a, V: Lanes> {
+        mech: &'a Mechanism,
+        pose: &'a Pose<V>,
+        places: &'a mut [JointFrame<V>],
     } -> () {
-        leg.solve(drive, places, given, length);
+        put_places(mech, pose, places);
     }
 }
 work! {
@@ -483,21 +380,6 @@ work! {
     }
 }
 work! {
-    TurnStresses<'a, V: Lanes> { choice: &'a mut Choice<V>, places: &'a [JointFrame<V>] } -> () {
-        choice.turn(places);
-    }
-}
-work! {
-    MakeLeast<'a, V: Lanes> {
-        choice: &'a mut Choice<V>,
-        places: &'a [JointFrame<V>],
-        couples_first: bool,
-        reactions: &'a mut [Wrench<V>],
-    } -> () {
-        choice.make_least(places, couples_first, reactions);
-    }
-}
-work! {
     PutDeterminate<'a, 'b, V: Lanes> { solver: &'a mut Solver<'b, V> } -> () {
         solver.put_determinate();
     }
@@ -511,193 +393,4 @@ fn add_square<V: Real>(w: Wrench<V>, mut sum: V) -> V {
         sum = components[k].mul_add(components[k], sum);
     }
     sum
-}
-
-/// Self-stresses, and the rules by which they are added \[T47\].
-struct Choice<V> {
-    count: usize,
-    /// How many joints there are, and which of them are universal.
-    joints: usize,
-    universal: Vec<usize>,
-    /// Length that divides couples, and torques in the sum of squares that is minimised, m.
-    length: f64,
-    scale: f64,
-    /// The reactions of all joints, of one self-stress after the other.
-    stresses: Vec<Wrench<V>>,
-    /// Their couples in the universal joints, and the sum of squares of each one's; zero if it is as good as none.
-    couples: Vec<V>,
-    sizes: Vec<V>,
-    /// Products of the self-stresses.
-    system: Householder<V>,
-    shares: Vec<V>,
-}
-
-impl<V: Lanes> Choice<V> {
-    fn new(joints: &[LinkJoint], count: usize, length: f64, scale: f64) -> Self {
-        let is_universal = |&j: &usize| joints[j].kind == JointKind::Universal.letter();
-        let universal: Vec<usize> = (0..joints.len()).filter(is_universal).collect();
-        Choice {
-            count,
-            joints: joints.len(),
-            length,
-            scale,
-            stresses: vec![Wrench::zero(); count * joints.len()],
-            couples: vec![V::zero(); count * universal.len()],
-            universal,
-            sizes: vec![V::zero(); count],
-            system: Householder::new(count, count),
-            shares: vec![V::zero(); count],
-        }
-    }
-
-    #[inline(always)]
-    fn stress(&self, k: usize) -> &[Wrench<V>] {
-        &self.stresses[k * self.joints..(k + 1) * self.joints]
-    }
-
-    /// Rotates the self-stresses into others, orthonormal as they are, whose couples are perpendicular to one
-    /// another.
-    #[inline(always)]
-    fn turn(&mut self, places: &[JointFrame<V>]) {
-        let (width, mut all) = (self.universal.len(), V::zero());
-        for s in 0..self.count {
-            for u in 0..width {
-                let couple = self.couple(places, u, self.stress(s));
-                self.couples[s * width + u] = couple;
-                all = couple.mul_add(couple, all);
-            }
-        }
-        for _ in 0..SWEEPS {
-            let mut turned = V::zero();
-            for j in 1..self.count {
-                for i in 0..j {
-                    turned = turned.most(self.make_square(i, j, all));
-                }
-            }
-            if !any(turned) {
-                break;
-            }
-        }
-        for s in 0..self.count {
-            let size = self.product_of_couples(s, s);
-            self.sizes[s] = V::select(size.greater(V::lit(OPEN * OPEN)), size, V::zero());
-        }
-    }
-
-    #[inline(always)]
-    fn product_of_couples(&self, i: usize, j: usize) -> V {
-        let (width, mut sum) = (self.universal.len(), V::zero());
-        for u in 0..width {
-            sum = self.couples[i * width + u].mul_add(self.couples[j * width + u], sum);
-        }
-        sum
-    }
-
-    /// Rotates a pair where its couples are not perpendicular yet, and tells where.
-    #[inline(always)]
-    fn make_square(&mut self, i: usize, j: usize, all: V) -> V {
-        let (a, b) = (self.product_of_couples(i, i), self.product_of_couples(j, j));
-        let product = self.product_of_couples(i, j);
-        let counts = a.least(b).greater(all.scale(SQUARE * SQUARE));
-        let cosine = V::select(counts, product * product, V::zero());
-        let turns = cosine.greater((a * b).scale(SQUARE * SQUARE));
-        // The smaller rotation that does it: t = tan of its angle, t² + 2 ζ t = 1.
-        let zeta = (b - a) / (product + product);
-        let t = zeta.signum() / (zeta.abs() + zeta.mul_add(zeta, V::one()).sqrt());
-        let cos = V::one() / t.mul_add(t, V::one()).sqrt();
-        let sin = cos * t;
-        let width = self.universal.len();
-        for u in 0..width {
-            let (p, q) = (self.couples[i * width + u], self.couples[j * width + u]);
-            self.couples[i * width + u] = V::select(turns, cos * p - sin * q, p);
-            self.couples[j * width + u] = V::select(turns, sin * p + cos * q, q);
-        }
-        for joint in 0..self.joints {
-            let (at, other) = (i * self.joints + joint, j * self.joints + joint);
-            let (mut p, mut q) = (self.stresses[at].array(), self.stresses[other].array());
-            for k in 0..6 {
-                let (x, y) = (p[k], q[k]);
-                p[k] = V::select(turns, cos * x - sin * y, x);
-                q[k] = V::select(turns, sin * x + cos * y, y);
-            }
-            self.stresses[at] = Wrench::from_array(p);
-            self.stresses[other] = Wrench::from_array(q);
-        }
-        V::select(turns, V::one(), V::zero())
-    }
-
-    /// Adds self-stresses until the reactions are least, but first until the couples in universal joints are, if asked to. A
-    /// second time takes off the rounding of the first.
-    #[inline(always)]
-    fn make_least(&mut self, places: &[JointFrame<V>], couples_first: bool, reactions: &mut [Wrench<V>]) {
-        if self.count == 0 {
-            return;
-        }
-        for k in 0..self.count {
-            for s in 0..self.count {
-                // Self-stresses that change couples are left out of the second choice.
-                let kept = if couples_first { self.sizes[k].most(self.sizes[s]) } else { V::zero() };
-                let unit = V::lit(f64::from(u8::from(k == s)));
-                let product = self.product(self.stress(k), self.stress(s));
-                self.system.set(k, s, V::select(kept.greater(V::zero()), unit, product));
-            }
-        }
-        self.system.factor();
-        for _ in 0..2 {
-            if couples_first {
-                self.set_shares_of_couples(places, reactions);
-                self.take_off(reactions);
-            }
-            for s in 0..self.count {
-                let kept = if couples_first { self.sizes[s] } else { V::zero() };
-                let product = self.product(self.stress(s), reactions);
-                self.shares[s] = V::select(kept.greater(V::zero()), V::zero(), product);
-            }
-            self.system.solve(&mut self.shares);
-            self.take_off(reactions);
-        }
-    }
-
-    /// How much of each self-stress there is in the couples.
-    #[inline(always)]
-    fn set_shares_of_couples(&mut self, places: &[JointFrame<V>], reactions: &[Wrench<V>]) {
-        let width = self.universal.len();
-        for s in 0..self.count {
-            let mut sum = V::zero();
-            for u in 0..width {
-                let couple = self.couple(places, u, reactions);
-                sum = self.couples[s * width + u].mul_add(couple, sum);
-            }
-            let changes = self.sizes[s].greater(V::zero());
-            self.shares[s] = V::select(changes, sum / self.sizes[s], V::zero());
-        }
-    }
-
-    #[inline(always)]
-    fn take_off(&self, reactions: &mut [Wrench<V>]) {
-        for s in 0..self.count {
-            let (stress, share) = (self.stress(s), self.shares[s]);
-            for j in 0..self.joints {
-                reactions[j] = reactions[j] - stress[j] * share;
-            }
-        }
-    }
-
-    /// The couple in a universal joint, divided by the characteristic length.
-    #[inline(always)]
-    fn couple(&self, places: &[JointFrame<V>], universal: usize, reactions: &[Wrench<V>]) -> V {
-        let j = self.universal[universal];
-        places[j].axes.0[2].dot(reactions[j].torque).scale(1.0 / self.length)
-    }
-
-    /// The product whose square the second choice makes least.
-    #[inline(always)]
-    fn product(&self, a: &[Wrench<V>], b: &[Wrench<V>]) -> V {
-        let (mut forces, mut torques) = (V::zero(), V::zero());
-        for j in 0..self.joints {
-            forces = forces + a[j].force.dot(b[j].force);
-            torques = torques + a[j].torque.dot(b[j].torque);
-        }
-        forces + torques.scale(1.0 / (self.scale * self.scale))
-    }
 }

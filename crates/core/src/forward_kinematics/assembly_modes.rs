@@ -6,8 +6,9 @@
 //! real ones kept.
 
 use crate::forward_kinematics::gauss_newton;
-use crate::forward_kinematics::homotopy::{C, HomotopyPath, Lengths, PathEnd, modulus};
+use crate::forward_kinematics::homotopy::{HomotopyPath, Lengths, PathEnd};
 use crate::forward_kinematics::newton::{self, FoundPose, LegTarget, system};
+use crate::forward_kinematics::path_point::{C, modulus};
 use crate::forward_kinematics::start_system::Products;
 use crate::kinematics::leg;
 use crate::mobility::sufficient_actuators::sufficient_actuators;
@@ -20,8 +21,8 @@ use crate::number::real::count;
 use crate::numerics::random::Random;
 use crate::spatial::{Mat3, Pose, Vec3};
 
-/// Error of a predicted step that a path is followed with, as a pure number; the later ones where paths came too close
-/// to each other.
+/// Error of a predicted step that a path is followed with, as a pure number; the later ones where paths came
+/// too close to each other.
 const PRECISIONS: [f64; 3] = [3e-2, 1e-4, 1e-6];
 
 /// Precision of the search for the generic solutions, which is made once.
@@ -46,8 +47,9 @@ const EXACT: f64 = 1e-12;
 /// Numbers of real poses, as pure numbers, that are the same up to rounding.
 const EQUAL: f64 = 1e-9;
 
-/// How far, relative to those at home, the generic squared lengths are from real ones. Nearly singular poses of real
-/// mechanisms belong to solutions that run far away as the lengths change: from nearby they stay within reach.
+/// How far, relative to those at home, the generic squared lengths are from real ones. Nearly singular poses
+/// of real mechanisms belong to solutions that run far away as the lengths change: from nearby they stay
+/// within reach.
 const GENERIC: f64 = 0.1;
 
 /// Searches in a row that must find nothing new before the solutions count as complete.
@@ -80,7 +82,8 @@ impl Start {
     /// Adds a solution for the generic lengths, if it is a new one.
     fn extend(&mut self, mech: &Mechanism, pose: Pose<C>) {
         if self.poses.is_empty() {
-            // The reflection is one only if it maps solutions to solutions: the planes of rods must agree with it too.
+            // The reflection is one only if it maps solutions to solutions: the planes of rods must agree
+            // with it too.
             self.mirror = self.mirror.filter(|m| {
                 let residual = system(mech, &m.apply(&pose), &self.asked).residual;
                 residual.iter().all(|f| f.norm() < SAME)
@@ -162,8 +165,8 @@ fn plane(points: &[Vec3<f64>]) -> Option<(Vec3<f64>, Vec3<f64>)> {
     points.iter().all(|&p| normal.dot(p - first).abs() <= 1e-12 * size).then_some((first, normal))
 }
 
-/// All solutions for generic complex lengths, by continuation from products of linear forms \[T75\]; none where the legs
-/// and constraints are not six equations.
+/// All solutions for generic complex lengths, by continuation from products of linear forms \[T75\]; none
+/// where the legs and constraints are not six equations.
 #[must_use]
 pub fn start(mech: &Mechanism) -> Option<Start> {
     if mech.mobility.uncontrolled > 0 || mech.idle.len() > 1 {
@@ -221,9 +224,9 @@ fn generic(mech: &Mechanism, draw: &mut Random) -> [LegTarget<C>; 6] {
     asked
 }
 
-/// Distance of two poses as a pure number, idle spins apart \[T71\]: of the columns of R, and of the points o in characteristic lengths, relative
-/// to how far off o is. Complex rotations may be large; `RᵀR = 1` then holds and tells them apart only to the square of
-/// their size, by which the distance is divided.
+/// Distance of two poses as a pure number, idle spins apart \[T71\]: of the columns of R, and of the points o
+/// in characteristic lengths, relative to how far off o is. Complex rotations may be large; `RᵀR = 1` then
+/// holds and tells them apart only to the square of their size, by which the distance is divided.
 fn distance(mech: &Mechanism, a: &Pose<C>, b: &Pose<C>) -> f64 {
     if let [idle] = &mech.idle[..] {
         return distance_of_lines(mech, idle, a, b);
@@ -299,8 +302,8 @@ pub struct Modes {
     pub status: Status,
 }
 
-/// Every real pose with the given lengths of all actuated legs; passive ones are not read. Where legs are redundant, those of
-/// the square mechanism that meet the others as well \[T73\].
+/// Every real pose with the given lengths of all actuated legs; passive ones are not read. Where legs are
+/// redundant, those of the square mechanism that meet the others as well \[T73\].
 #[must_use]
 pub fn assembly_modes_of_all(mech: &Mechanism, start: &Start, lengths: &[f64]) -> Modes {
     let of = |mech: &Mechanism| -> Vec<f64> { mech.actuated().map(|(k, _)| lengths[k]).collect() };
@@ -426,8 +429,8 @@ fn keep(mech: &Mechanism, modes: &mut Vec<Mode>, mode: Mode) {
     }
 }
 
-/// The unit normal of the plane of the base joints, or else the direction from their middle, to the side where the
-/// platform is at home.
+/// The unit normal of the plane of the base joints, or else the direction from their middle, to the side
+/// where the platform is at home.
 fn upward(mech: &Mechanism) -> Vec3<f64> {
     let points: Vec<Vec3<f64>> = mech.legs.iter().map(|leg| leg.base.point).collect();
     let middle = points.iter().fold(Vec3::zero(), |sum, &p| sum + p) * (1.0 / count(points.len()));

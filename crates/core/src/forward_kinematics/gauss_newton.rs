@@ -24,15 +24,15 @@ use crate::spatial::{Pose, Wrench};
 /// Steps after which the iteration is given up.
 const STEPS: u32 = 200;
 
-/// Largest error of a length, relative to the characteristic length, of a pose that has the lengths: as much as poses may miss
-/// their constraints by.
+/// Largest error of a length, relative to the characteristic length, of a pose that has the lengths: as much
+/// as poses may miss their constraints by.
 const AGREEMENT: f64 = 1e-6;
 
 /// Largest residual of a constraint, as a pure number.
 const KEPT: f64 = 1e-11;
 
-/// Steps below this size are made whatever they do: the iteration contracts there, to rounding if the legs agree, and if they
-/// do not to where they are missed least.
+/// Steps below this size are made whatever they do: the iteration contracts there, to rounding if the legs
+/// agree, and if they do not to where they are missed least.
 const NEAR: f64 = 1e-6;
 
 /// Size of a step that is rounding.
@@ -47,14 +47,15 @@ pub fn serves(mech: &Mechanism) -> bool {
     mech.is_redundant() || mech.mobility.uncontrolled > 0
 }
 
-/// What a pose misses, in pure numbers, and the step that takes most of it off; for one state, or one in each lane.
+/// What a pose misses, in pure numbers, and the step that takes most of it off; for one state, or one in each
+/// lane.
 #[derive(Clone, Copy, Debug, Default)]
 struct Misses<T> {
     /// The largest errors of lengths and of constraints.
     legs: T,
     others: T,
-    /// What must fall: the sum of the squares of what lengths miss, and what constraints miss, not squared, so that they are
-    /// kept at the cost of lengths that contradict one another.
+    /// What must fall: the sum of the squares of what lengths miss, and what constraints miss, not squared,
+    /// so that they are kept at the cost of lengths that contradict one another.
     merit: T,
     /// (v/Λ, ω), and its size.
     step: [T; 6],
@@ -65,8 +66,8 @@ struct Misses<T> {
     pivots: T,
 }
 
-/// Rows of the legs from the places that are asked for (those of a slider have no branch), what lengths miss, and what the other
-/// rows miss, all as pure numbers.
+/// Rows of the legs from the places that are asked for (those of a slider have no branch), what lengths miss,
+/// and what the other rows miss, all as pure numbers.
 struct Errors<V> {
     rows: Vec<[V; 6]>,
     legs: Vec<V>,
@@ -245,8 +246,8 @@ impl<'a> Search<'a> {
     }
 }
 
-/// A pose near the guess with the given lengths of all actuated legs. Where the nearest one does not have them, they contradict
-/// one another, and the status says so.
+/// A pose near the guess with the given lengths of all actuated legs. Where the nearest one does not have
+/// them, they contradict one another, and the status says so.
 #[must_use]
 pub fn forward_kinematics(mech: &Mechanism, lengths: &[f64], guess: &Pose<f64>) -> FoundPose {
     let state = (lengths.to_vec(), *guess);

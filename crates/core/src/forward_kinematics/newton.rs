@@ -1,4 +1,4 @@
-//! Forward kinematics: from leg lengths to the pose, by Newton's method on SE(3) \[T25\]-\[T27\].
+//! Forward kinematics: from leg lengths to the pose, by Newton's method on SE(3) \[T25\] \[T26\] \[T27\].
 //!
 //! The equations are polynomials in the pose, for any number: doubles here, complex numbers in
 //! [`modes`](crate::forward_kinematics::assembly_modes), where all of their solutions are followed.
@@ -16,7 +16,8 @@ use crate::spatial::{Pose, Twist, Vec3, Wrench};
 /// Steps after which the iteration is given up.
 const NEWTON_STEPS: u32 = 200;
 
-/// Step, relative to the characteristic length, from which the next one is rounding: Newton's method is quadratic.
+/// Step, relative to the characteristic length, from which the next one is rounding: Newton's method is
+/// quadratic.
 pub(crate) const SMALL_STEP: f64 = 1e-9;
 
 /// Residual, as a pure number, that is rounding of zero.
@@ -26,7 +27,8 @@ pub(crate) const ROUNDING: f64 = 2e-14;
 /// Kantorovich asks for: the solution is then the only one around, and the one that belongs to the guess.
 pub(crate) const CONTRACTION: f64 = 0.25;
 
-/// Newton steps for one piece of the path: with that contraction no more are needed from half a radian to rounding.
+/// Newton steps for one piece of the path: with that contraction no more are needed from half a radian to
+/// rounding.
 pub(crate) const PIECE_STEPS: u32 = 12;
 
 /// Shortest piece of the path: where shorter ones would be needed, its assembly mode ends.
@@ -44,8 +46,8 @@ const SMALLEST_SHARE: f64 = 1e-7;
 /// How much nearer to where a motion points the one of two solutions must be to be the one that it goes to.
 const CLEARLY: f64 = 0.25;
 
-/// Pivot ratio of the equations below which two assembly modes meet: the pose is then only known to the square root
-/// of rounding.
+/// Pivot ratio of the equations below which two assembly modes meet: the pose is then only known to the
+/// square root of rounding.
 pub const FOLD_PIVOTS: f64 = 1e-5;
 
 /// Target of an actuated leg: the position of its foot on the rail (zero for a telescopic leg, whose foot is
@@ -83,8 +85,8 @@ impl<T: Real> LegTarget<T> {
     }
 }
 
-/// The equations at a pose, pure numbers: `(r·r - ℓ²)/2Λ²` of the actuated legs and g of the independent constraints
-/// \[T25\]. The matrix is their derivative by (v/Λ, ω).
+/// The equations at a pose, pure numbers: `(r·r - ℓ²)/2Λ²` of the actuated legs and g of the independent
+/// constraints \[T25\]. The matrix is their derivative by (v/Λ, ω).
 #[derive(Clone, Copy, Debug)]
 pub struct System<T> {
     pub residual: [T; 6],
@@ -209,8 +211,8 @@ pub struct FoundPose {
 
 /// The pose with the given lengths of the actuated legs, in the assembly mode of the guess \[T26\], \[T27\].
 ///
-/// Where the mode ends in a singularity on the way, the nearest other solution is sought and reported as one of another
-/// mode.
+/// Where the mode ends in a singularity on the way, the nearest other solution is sought and reported as one
+/// of another mode.
 #[must_use]
 pub fn forward_kinematics(mech: &Mechanism, lengths: &[f64], guess: &Pose<f64>) -> FoundPose {
     let asked = asked(mech, lengths);
@@ -234,9 +236,9 @@ pub fn forward_kinematics(mech: &Mechanism, lengths: &[f64], guess: &Pose<f64>) 
     FoundPose { iterations: steps + other.iterations, status, ..other }
 }
 
-/// The solution that a motion through the poses `before` and `last` leads to if it goes on evenly, where this is one of
-/// another mode than the one that was `found`, and clearly the nearer to where the motion points: then the motion has
-/// passed a singularity between the states, which the lengths alone do not show \[T27\].
+/// The solution that a motion through the poses `before` and `last` leads to if it goes on evenly, where this
+/// is one of another mode than the one that was `found`, and clearly the nearer to where the motion points:
+/// then the motion has passed a singularity between the states, which the lengths alone do not show \[T27\].
 #[must_use]
 pub fn passed(
     mech: &Mechanism,
@@ -265,9 +267,10 @@ pub fn passed(
     })
 }
 
-/// Follows the solutions of `F = (1 - t) F(guess)` from the guess at t = 0 to t = 1 by Newton's method, in one piece if
-/// it contracts, else in as many as it takes \[T27\]. None where the determinant would change its sign or pieces shorter
-/// than `shortest` be needed: a singularity lies on the path. Tells the number of Newton steps.
+/// Follows the solutions of `F = (1 - t) F(guess)` from the guess at t = 0 to t = 1 by Newton's method, in
+/// one piece if it contracts, else in as many as it takes \[T27\]. None where the determinant would change
+/// its sign or pieces shorter than `shortest` be needed: a singularity lies on the path. Tells the number of
+/// Newton steps.
 #[must_use]
 pub fn continuation(
     mech: &Mechanism,
@@ -309,7 +312,8 @@ pub fn continuation(
     (Some(pose), steps)
 }
 
-/// A solution near a pose, whatever its mode, by Newton steps that are shortened until they come nearer \[T26\].
+/// A solution near a pose, whatever its mode, by Newton steps that are shortened until they come nearer
+/// \[T26\].
 #[must_use]
 pub fn polish(mech: &Mechanism, asked: &[LegTarget<f64>; 6], guess: &Pose<f64>) -> FoundPose {
     let mut pose = *guess;

@@ -16,7 +16,8 @@ use crate::spatial::packed_poses::{Poses, get, load, put, store};
 /// Coordinates of the actuated legs, and a guess.
 pub type Guessed = (Vec<f64>, Pose<f64>);
 
-/// [`forward_kinematics`](crate::forward_kinematics::newton::forward_kinematics) of at most [`WIDTH`] states, each as if it were alone.
+/// [`forward_kinematics`](crate::forward_kinematics::newton::forward_kinematics) of at most [`WIDTH`] states,
+/// each as if it were alone.
 ///
 /// # Panics
 /// If there are more.

@@ -1,12 +1,14 @@
 //! Start system of the homotopy, in Study's coordinates \[T75\].
 //!
 //! In Study's coordinates of a pose, `x = (q, p)` with the dual part `p = o q/2Λ`, each equation of
-//! [`forward`](crate::forward_kinematics::newton) is homogeneous: of degree two, or four for a rod whose legs are at an angle. Products of as
-//! many linear forms have their solutions where one form of each vanishes: on lines that meet Study's quadric `q·p = 0`
-//! twice. As such products change into the equations, every regular solution of those is the end of a path.
+//! [`forward`](crate::forward_kinematics::newton) is homogeneous: of degree two, or four for a rod whose legs
+//! are at an angle. Products of as many linear forms have their solutions where one form of each vanishes: on
+//! lines that meet Study's quadric `q·p = 0` twice. As such products change into the equations, every regular
+//! solution of those is the end of a path.
 
-use crate::forward_kinematics::homotopy::{C, Family, PathPoint};
+use crate::forward_kinematics::homotopy::Family;
 use crate::forward_kinematics::newton::{LegTarget, System, system};
+use crate::forward_kinematics::path_point::{C, PathPoint};
 use crate::kinematics::rows::{self, Row};
 use crate::model::mechanism::{Constraint, ConstraintKind, Mechanism};
 use crate::number::complex::Complex;

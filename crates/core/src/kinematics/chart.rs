@@ -13,7 +13,8 @@ use crate::numerics::gauss::{Solved, solve};
 use crate::numerics::svd::Svd;
 use crate::spatial::{Acceleration, Pose, Twist, Vec3, Wrench};
 
-/// Newton steps from a chart's tangent to the constraints; quadratic, so that a few are enough wherever θ is small.
+/// Newton steps from a chart's tangent to the constraints; quadratic, so that a few are enough wherever θ is
+/// small.
 const NEWTON_STEPS: usize = 20;
 
 /// A step across, relative to the characteristic length, that is rounding.
@@ -88,7 +89,8 @@ impl Chart {
         x
     }
 
-    /// Shares ν of the directions across, as many as there are constraints, with `(row · L(w) across) ν = rhs`.
+    /// Shares ν of the directions across, as many as there are constraints, with
+    /// `(row · L(w) across) ν = rhs`.
     fn across(
         &self,
         mech: &Mechanism,

@@ -1,5 +1,5 @@
-//! The scalar constraints that legs put on the platform: five kinds, each with its value, its wrench (the row of
-//! the Jacobian) and its Hessian \[T9\]-\[T12\].
+//! The scalar constraints that legs put on the platform: five kinds, each with its value, its wrench (the row
+//! of the Jacobian) and its Hessian \[T9\] \[T10\] \[T11\] \[T12\].
 
 use crate::kinematics::leg;
 use crate::kinematics::quadratic_forms::{Hessian, add_centripetal, add_mixed, point_columns};
@@ -52,9 +52,9 @@ pub fn of_leg<S: Scalar>(index: usize, leg: &Leg<S>) -> Vec<Constraint<S>> {
     }
 }
 
-/// The constraints of a rod that carries several legs: its revolute axes are fixed in it, so that the legs' planes
-/// through its line keep the angle that they have at home. L is divided by a length to make g one. Angle and length are
-/// the rod's own: they do not vary with points and axes.
+/// The constraints of a rod that carries several legs: its revolute axes are fixed in it, so that the legs'
+/// planes through its line keep the angle that they have at home. L is divided by a length to make g one.
+/// Angle and length are the rod's own: they do not vary with points and axes.
 #[must_use]
 pub fn of_rod<S: Trig + Constant<S>>(
     mech_legs: &[Leg<S>],
@@ -165,7 +165,8 @@ pub fn row<T: Real>(constraint: &Constraint<impl Constant<T>>, pose: &Pose<T>) -
     }
 }
 
-/// The symmetric 6×6 matrix h with `g̈ = (c, τ)·A + Vᵀ h V` \[T12\]; for kind A the symmetric part of \[Eq. 17\].
+/// The symmetric 6×6 matrix h with `g̈ = (c, τ)·A + Vᵀ h V` \[T12\]; for kind A the symmetric part of
+/// \[Eq. 17\].
 #[inline(always)]
 pub fn hessian<T: Real>(constraint: &Constraint<impl Constant<T>>, pose: &Pose<T>) -> Hessian<T> {
     let v = vectors(constraint, pose);

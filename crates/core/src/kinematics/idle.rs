@@ -28,8 +28,8 @@ pub fn axis<T: Real>(idle: &Idle<impl Constant<T>>, pose: &Pose<T>) -> Vec3<T> {
     }
 }
 
-/// The row (0, u) of the Jacobian: the rate is the spin ω·u, the multiplier a torque along u. The rate of u does not change
-/// the spin, so that its layer of the Hessian is zero.
+/// The row (0, u) of the Jacobian: the rate is the spin ω·u, the multiplier a torque along u. The rate of u
+/// does not change the spin, so that its layer of the Hessian is zero.
 #[inline(always)]
 pub fn row<T: Real>(idle: &Idle<impl Constant<T>>, pose: &Pose<T>) -> Wrench<T> {
     Wrench::new(Vec3::zero(), axis(idle, pose))

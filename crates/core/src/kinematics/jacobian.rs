@@ -20,8 +20,8 @@ pub fn jacobian<T: Real>(mech: &Mechanism<impl Constant<T>>, pose: &Pose<T>) -> 
     matrix
 }
 
-/// J with its torque columns divided by the characteristic length: pure numbers, so that a pivot ratio means the
-/// same for every size of machine. It belongs to the twist (v, Λω).
+/// J with its torque columns divided by the characteristic length: pure numbers, so that a pivot ratio means
+/// the same for every size of machine. It belongs to the twist (v, Λω).
 #[inline(always)]
 pub fn scaled_jacobian<T: Real>(mech: &Mechanism<impl Constant<T>>, pose: &Pose<T>) -> Matrix6<T> {
     scaled(mech, jacobian(mech, pose))
@@ -109,8 +109,8 @@ pub struct PlatformMotion<V: Ordered> {
     pub agrees: V::Mask,
 }
 
-/// Finds motions of the platform from those of its legs: by Gaussian elimination where J is square, in the sense of least squares
-/// where actuators are redundant \[T73\]. Room for one state after another.
+/// Finds motions of the platform from those of its legs: by Gaussian elimination where J is square, in the
+/// sense of least squares where actuators are redundant \[T73\]. Room for one state after another.
 pub struct MotionSolver<V> {
     /// Rates or accelerations of the actuated legs, then of local degrees of freedom: none of these if they
     /// do not spin.

@@ -14,16 +14,16 @@ pub fn vectors<T: Real>(leg: &Leg<impl Constant<T>>, pose: &Pose<T>) -> (Vec3<T>
     (e, pose.o + e - Vec3::lift(leg.base.point))
 }
 
-/// [Eq. 2, 3] \[T1\] `e = R m, b = o + e, r = b - B, δ = r/ℓ`; of a slider \[T67\], whose coordinate is not a number where
-/// its strut does not reach the rail.
+/// [Eq. 2, 3] \[T1\] `e = R m, b = o + e, r = b - B, δ = r/ℓ`; of a slider \[T67\], whose coordinate is not a
+/// number where its strut does not reach the rail.
 #[inline(always)]
 pub fn position<T: Real>(leg: &Leg<impl Constant<T>>, pose: &Pose<T>) -> Position<T> {
     let (e, r) = vectors(leg, pose);
     leg.drive.position(e, r)
 }
 
-/// r·d, d being the direction that a fixed joint gives to the leg: its length, or less than zero where the leg would have to
-/// point backwards \[T9\].
+/// r·d, d being the direction that a fixed joint gives to the leg: its length, or less than zero where the
+/// leg would have to point backwards \[T9\].
 #[inline(always)]
 pub fn ahead<S: Constant<T>, T: Real>(mech: &Mechanism<S>, direction: &Direction<S>, pose: &Pose<T>) -> T {
     let d = match direction.side {
@@ -102,7 +102,7 @@ pub fn frame<T: Real>(leg: &Leg<impl Constant<T>>, pose: &Pose<T>, p: &Position<
     Frame { axes: Mat3::from_columns(n, p.delta, n.cross(p.delta)), sine, slope }
 }
 
-/// How the platform end moves, and with it the leg's coordinate and direction \[T2\]-\[T4\] \[T68\].
+/// How the platform end moves, and with it the leg's coordinate and direction \[T2\] \[T3\] \[T4\] \[T68\].
 #[inline(always)]
 pub fn end<T: Real>(
     leg: &Leg<impl Constant<T>>,
@@ -119,7 +119,8 @@ pub fn end<T: Real>(
     leg.drive.end(p, f, v_b, a_b)
 }
 
-/// The leg's angular velocity and acceleration: with u = L [Eq. 22-28], with u = -e/|e| on the platform [Eq. 29-35].
+/// The leg's angular velocity and acceleration: with u = L [Eq. 22, 23, 24, 25, 26, 27, 28], with u = -e/|e|
+/// on the platform [Eq. 29, 30, 31, 32, 33, 34, 35].
 #[inline(always)]
 pub fn turn<T: Real>(
     leg: &Leg<impl Constant<T>>,
@@ -150,8 +151,8 @@ pub fn turn<T: Real>(
     }
 }
 
-/// [T6] `s = κa`, `s' = κ(a₁ - 2bs) - ab` for δ' = (a, b) and δ'' = (a₁, ·) along n and m, seen from the body of u; an R
-/// or F joint, where a = 0, lets nothing spin.
+/// [T6] `s = κa`, `s' = κ(a₁ - 2bs) - ab` for δ' = (a, b) and δ'' = (a₁, ·) along n and m, seen from the body
+/// of u; an R or F joint, where a = 0, lets nothing spin.
 #[inline(always)]
 fn spin<T: Real>(turning: Turning<impl Constant<T>>, slope: T, a: T, b: T, a1: T) -> (T, T) {
     match turning {
@@ -189,8 +190,8 @@ pub fn state<T: Real>(leg: &Leg<impl Constant<T>>, platform: &Motion<T>) -> LegS
     moving(leg, &place(leg, &platform.pose), platform)
 }
 
-/// Carries a force F at b and a torque M on the leg, both along n, δ, m, to the platform: `F·v_b + M·ω_leg` as a wrench
-/// at o \[T14\] \[T69\].
+/// Carries a force F at b and a torque M on the leg, both along n, δ, m, to the platform: `F·v_b + M·ω_leg`
+/// as a wrench at o \[T14\] \[T69\].
 #[inline(always)]
 pub fn carry<T: Real>(
     leg: &Leg<impl Constant<T>>,

@@ -37,7 +37,7 @@ impl<T: Real> Frame<T> {
     }
 }
 
-/// How the platform end moves, and with it the leg's coordinate and direction \[T2\]-\[T4\] \[T68\].
+/// How the platform end moves, and with it the leg's coordinate and direction \[T2\] \[T3\] \[T4\] \[T68\].
 #[derive(Clone, Copy, Debug)]
 pub struct EndMotion<T> {
     /// Base axes.

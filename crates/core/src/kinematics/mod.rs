@@ -1,6 +1,8 @@
 pub mod chart;
 pub mod constraint;
+pub mod coordinate_sensitivity;
 pub mod coordinate_sets;
+pub mod dependent_coordinates;
 pub mod drive;
 pub mod idle;
 pub mod jacobian;

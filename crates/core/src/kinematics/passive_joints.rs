@@ -1,7 +1,7 @@
 //! Angles of the passive joints, zero at the home pose; their rates are projections of angular velocities.
 //!
-//! At the base they are those of the leg against the base, at the platform those of the platform against the leg, so
-//! that `ω = ω_leg + φ_1' u + φ_2' n` [Eq. 29].
+//! At the base they are those of the leg against the base, at the platform those of the platform against the
+//! leg, so that `ω = ω_leg + φ_1' u + φ_2' n` [Eq. 29].
 
 use crate::kinematics::leg::{self, LegState};
 use crate::model::joint::Joint;
@@ -11,7 +11,8 @@ use crate::model::spec::Axes;
 use crate::number::real::{Real, Trig};
 use crate::spatial::{Mat3, Motion, Pose, Vec3};
 
-/// Angles and rates of one joint: U has both (about the axis in the body, then about n), R the first, others none.
+/// Angles and rates of one joint: U has both (about the axis in the body, then about n), R the first, others
+/// none.
 #[derive(Clone, Copy, Debug)]
 pub struct JointAngles<T> {
     pub angles: [T; 2],
@@ -56,8 +57,8 @@ pub fn angles<T: Trig>(
     ]
 }
 
-/// Angles of one joint of a leg with the normal `n` and the direction `delta`, given in base axes; `rotation` is
-/// the platform's. NaN where the joint has none.
+/// Angles of one joint of a leg with the normal `n` and the direction `delta`, given in base axes; `rotation`
+/// is the platform's. NaN where the joint has none.
 #[inline(always)]
 pub fn angles_at<T: Trig>(
     leg: &Leg,

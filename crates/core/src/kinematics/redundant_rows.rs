@@ -1,8 +1,8 @@
-//! The Jacobian of a mechanism with redundant actuators, factored: forces of least norm, twists in the sense of least
-//! squares, and the null space of the constraints \[T72\] \[T73\].
+//! The Jacobian of a mechanism with redundant actuators, factored: forces of least norm, twists in the sense
+//! of least squares, and the null space of the constraints \[T72\] \[T73\].
 //!
-//! The rows themselves are factored by Householder reflections; products of rows, which would square their condition number,
-//! are never formed.
+//! The rows themselves are factored by Householder reflections; products of rows, which would square their
+//! condition number, are never formed.
 
 use crate::kinematics::constraint;
 use crate::kinematics::rows::Row;
@@ -14,8 +14,8 @@ use crate::number::work::Work;
 use crate::numerics::householder::Householder;
 use crate::spatial::{Pose, Twist, Wrench};
 
-/// Largest part of the rates (or accelerations) of legs that may contradict the rest: as much as a twist may miss a
-/// constraint by.
+/// Largest part of the rates (or accelerations) of legs that may contradict the rest: as much as a twist may
+/// miss a constraint by.
 const CONTRADICTION: f64 = 1e-6;
 
 /// The rows A of the n actuated legs and C of constraints and local degrees of freedom, in pure numbers,
@@ -36,7 +36,8 @@ pub struct RedundantRows<V> {
     allowed: Vec<[V; 6]>,
     added: Vec<V>,
     unit: Vec<V>,
-    /// A lower bound of the ratio of least to greatest singular value of C and of AN; NaN or zero at singular poses.
+    /// A lower bound of the ratio of least to greatest singular value of C and of AN; NaN or zero at singular
+    /// poses.
     pub regular: V,
     /// Of the actuated legs.
     pub forces: Vec<V>,
@@ -91,8 +92,8 @@ impl<V: Lanes> RedundantRows<V> {
         self.factor_set();
     }
 
-    /// The least step (v/Λ, ω) that takes off what the others miss and, within that, most of what legs miss in the sense of
-    /// least squares; all in pure numbers, lengths and values divided by Λ.
+    /// The least step (v/Λ, ω) that takes off what the others miss and, within that, most of what legs miss
+    /// in the sense of least squares; all in pure numbers, lengths and values divided by Λ.
     #[inline(always)]
     pub(crate) fn least_step(&mut self, legs: &[V], others: &[V]) -> [V; 6] {
         let mut rates = [V::zero(); 6];
@@ -103,15 +104,16 @@ impl<V: Lanes> RedundantRows<V> {
         Twist::new(self.motion.v, self.motion.omega.scale(self.scale)).array()
     }
 
-    /// Solves `f - A y = preferred`, `Aᵀ f + Cᵀ λ = w`, `C y = rates`, in SI units; none for zeros. So f are the forces
-    /// nearest to the preferred ones that balance -w \[T72\]; with w zero, y is the twist of least squares for rates of the
-    /// legs that are minus the preferred forces \[T73\].
+    /// Solves `f - A y = preferred`, `Aᵀ f + Cᵀ λ = w`, `C y = rates`, in SI units; none for zeros. So f are
+    /// the forces nearest to the preferred ones that balance -w \[T72\]; with w zero, y is the twist of least
+    /// squares for rates of the legs that are minus the preferred forces \[T73\].
     #[inline(always)]
     pub fn solve(&mut self, w: Wrench<V>, preferred: &[V], rates: &[V]) {
         V::apart(Solve { rows: self, w, preferred, rates });
     }
 
-    /// The same for a unit of one part of the right-hand sides: of -w for the first six, then of preferred forces and of rates.
+    /// The same for a unit of one part of the right-hand sides: of -w for the first six, then of preferred
+    /// forces and of rates.
     #[inline(always)]
     pub fn solve_unit(&mut self, k: usize) {
         let mut unit = [V::zero(); 6];
@@ -351,7 +353,8 @@ mod tests {
 
     #[test]
     fn condition_numbers_are_not_squared() {
-        // Two legs nearly in one line hold the first direction by a billionth: products of rows would know nothing of it.
+        // Two legs nearly in one line hold the first direction by a billionth: products of rows would know
+        // nothing of it.
         let tiny = 1e-9;
         let unit = |i: usize| std::array::from_fn(|j| f64::from(u8::from(i == j)));
         let mut found = RedundantRows::with(7, 1.0, vec![], vec![]);

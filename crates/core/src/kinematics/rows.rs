@@ -1,6 +1,7 @@
 //! Rows of the Jacobian in their order: actuated legs, local degrees of freedom, independent constraints.
 //!
-//! The order is written here alone: [`of`] goes through the rows, [`RowNumbers`] tells where those of each sort are.
+//! The order is written here alone: [`of`] goes through the rows, [`RowNumbers`] tells where those of each
+//! sort are.
 
 use std::ops::Range;
 
@@ -35,9 +36,9 @@ pub fn others<S>(mech: &Mechanism<S>) -> impl Iterator<Item = Row<'_, S>> {
     mech.idle.iter().map(Row::Idle).chain(mech.independent.iter().map(Row::Constraint))
 }
 
-/// The same for kernels: a body for each row and its number, or for the rows after those of the legs, numbered from a given
-/// one on. A loop for each sort of row, inside which the compiler knows the sort; with the iterators it asks for it at
-/// each row.
+/// The same for kernels: a body for each row and its number, or for the rows after those of the legs,
+/// numbered from a given one on. A loop for each sort of row, inside which the compiler knows the sort; with
+/// the iterators it asks for it at each row.
 macro_rules! for_each_row {
     ($mech:expr, |$k:ident, $row:ident| $body:block) => {{
         let mut count = 0;
@@ -168,14 +169,15 @@ pub fn pure_rows(mech: &Mechanism, pose: &Pose<f64>, scale: f64) -> Vec<[f64; 6]
     of(mech).map(|row| row.pure(pose, scale)).collect()
 }
 
-/// A constraint's row for the twist (v, Λω), of a constraint counted as a length, in pure numbers: `(c, τ/Λ)`, and
-/// `(0, τ)` for kind D \[T30\].
+/// A constraint's row for the twist (v, Λω), of a constraint counted as a length, in pure numbers:
+/// `(c, τ/Λ)`, and `(0, τ)` for kind D \[T30\].
 #[inline(always)]
 pub(crate) fn constraint_row<T: Real>(c: &Constraint, pose: &Pose<T>, scale: f64) -> [T; 6] {
     pure_row(constraint::row(c, pose) * T::lit(constraint::length(c, scale)), scale)
 }
 
-/// J in pure numbers for the length `scale`: its determinant says on which side of the singular poses a pose is \[T30\].
+/// J in pure numbers for the length `scale`: its determinant says on which side of the singular poses a pose
+/// is \[T30\].
 #[inline(always)]
 pub fn pure_jacobian<T: Real>(mech: &Mechanism, pose: &Pose<T>, scale: f64) -> Matrix6<T> {
     let mut rows = [[T::zero(); 6]; 6];

@@ -1,7 +1,8 @@
-//! The limits of a mechanism, and how far a pose is from each \[T35\]-\[T38\].
+//! The limits of a mechanism, and how far a pose is from each \[T35\] \[T36\] \[T37\] \[T38\].
 //!
-//! A margin is signed, continuous in the pose and in the unit of what it limits: positive inside, negative outside.
-//! Divided by the limit's own scale it is a pure number, so that different limits compare: the least one *binds*.
+//! A margin is signed, continuous in the pose and in the unit of what it limits: positive inside, negative
+//! outside. Divided by the limit's own scale it is a pure number, so that different limits compare: the least
+//! one *binds*.
 
 use std::sync::Arc;
 
@@ -135,8 +136,8 @@ impl Limit {
         closed.then(|| self.of_pose(mech, pose, &mut LegCache::default()))
     }
 
-    /// The signed slack at a pose, or at those of all lanes \[T35\]. `forces` are those of the actuators in the
-    /// Jacobian's order. Who asks for several limits at a pose has all share what is `seen` of its legs.
+    /// The signed slack at a pose, or at those of all lanes \[T35\]. `forces` are those of the actuators in
+    /// the Jacobian's order. Who asks for several limits at a pose has all share what is `seen` of its legs.
     #[inline(always)]
     pub fn margin_at<V: Lanes>(
         &self,
@@ -208,7 +209,8 @@ impl<T: Real> LegCache<T> {
     }
 }
 
-/// The smallest singular value in each lane, one after the other: the rotations it takes differ from pose to pose.
+/// The smallest singular value in each lane, one after the other: the rotations it takes differ from pose to
+/// pose.
 #[inline(always)]
 fn smallest<V: Lanes>(mech: &Mechanism, pose: &Pose<V>) -> V {
     let mut poses = [[0.0; WIDTH]; 12];
@@ -338,7 +340,8 @@ impl<V: Ordered> Binding<V> {
     }
 }
 
-/// The limit with the least margin relative to its scale; none where a margin is NaN, or without limits \[T35\].
+/// The limit with the least margin relative to its scale; none where a margin is NaN, or without limits
+/// \[T35\].
 #[must_use]
 pub fn binding(mech: &Mechanism, margins: &[f64]) -> Option<usize> {
     let mut binding = Binding::default();
@@ -348,14 +351,16 @@ pub fn binding(mech: &Mechanism, margins: &[f64]) -> Option<usize> {
     (!binding.limit.is_nan()).then_some(binding.limit as usize)
 }
 
-// --- the list of a mechanism ---------------------------------------------------------------------------------
+// --- the list of a mechanism
+// ---------------------------------------------------------------------------------
 
-/// The stretch of a strut at its joint that does not count is by default this many times as long as its radius and the
-/// clearance together: the strut may then lean until the sine of its angle with the plate is a third.
+/// The stretch of a strut at its joint that does not count is by default this many times as long as its
+/// radius and the clearance together: the strut may then lean until the sine of its angle with the plate is a
+/// third.
 const REACH: f64 = 3.0;
 
-/// All limits that a description sets: of the joints, leg by leg, then clearances, conditioning, forces. Where it sets
-/// none the list is empty.
+/// All limits that a description sets: of the joints, leg by leg, then clearances, conditioning, forces.
+/// Where it sets none the list is empty.
 #[must_use]
 pub fn of(mech: &Mechanism, spec: &Spec) -> Vec<Limit> {
     let legs: Vec<&LegSpec> = spec.legs.iter().flatten().collect();

@@ -1,8 +1,8 @@
 //! Mobility from ranks: which constraints are independent, how many loop closures are redundant and which
 //! legs they couple, which degrees of freedom are passive \[T18\].
 //!
-//! Ranks are taken at several generic poses near home, which the machine can have, and the largest counts: at a singular pose
-//! a rank only drops.
+//! Ranks are taken at several generic poses near home, which the machine can have, and the largest counts: at
+//! a singular pose a rank only drops.
 
 use crate::kinematics::constraint;
 use crate::kinematics::idle;
@@ -24,8 +24,8 @@ pub(crate) const RANK_TOLERANCE: f64 = 1e-9;
 /// Generic poses looked at.
 const SAMPLES: u32 = 12;
 
-/// How far from home they are sought, in characteristic lengths and radians, nearer where the mechanism cannot be so far off: poses
-/// far away may be those of another mode.
+/// How far from home they are sought, in characteristic lengths and radians, nearer where the mechanism
+/// cannot be so far off: poses far away may be those of another mode.
 const SPREADS: [f64; 4] = [0.03, 0.01, 0.003, 0.001];
 
 const NEWTON_STEPS: usize = 60;
@@ -103,7 +103,8 @@ pub(crate) fn generic_poses(mech: &Mechanism) -> Vec<Pose<f64>> {
     poses
 }
 
-/// Whether every leg has a length, and every strut its rail within reach, with none backwards in a fixed joint.
+/// Whether every leg has a length, and every strut its rail within reach, with none backwards in a fixed
+/// joint.
 pub(crate) fn is_possible(mech: &Mechanism, pose: &Pose<f64>) -> bool {
     let has_length =
         |leg: &Leg| leg::position(leg, pose).length > RANK_TOLERANCE * mech.characteristic_length;
@@ -112,7 +113,8 @@ pub(crate) fn is_possible(mech: &Mechanism, pose: &Pose<f64>) -> bool {
     forwards && mech.legs.iter().all(|leg| has_length(leg) && reaches(leg))
 }
 
-/// The pose that satisfies `constraints`, found from `start` by damped Gauss-Newton steps of least size, or none.
+/// The pose that satisfies `constraints`, found from `start` by damped Gauss-Newton steps of least size, or
+/// none.
 #[must_use]
 pub fn project(constraints: &[Constraint], size: f64, start: &Pose<f64>) -> Option<Pose<f64>> {
     let mut pose = *start;
@@ -130,8 +132,8 @@ pub fn project(constraints: &[Constraint], size: f64, start: &Pose<f64>) -> Opti
             return None;
         }
         let g = scaled_rows(&rows, &sizes, size);
-        // Off the constraints redundant rows disagree; a damping of the order of the residual (Levenberg and Marquardt)
-        // keeps their disagreement from being followed and vanishes with it.
+        // Off the constraints redundant rows disagree; a damping of the order of the residual (Levenberg and
+        // Marquardt) keeps their disagreement from being followed and vanishes with it.
         let (Svd { values, u, v_t }, damping) = (Svd::of(&g)?, residual.amax() / size);
         let floor = values.max() * RANK_TOLERANCE;
         let damped = |s: f64| if s > floor { s / (s * s + damping * damping) } else { 0.0 };
@@ -151,8 +153,8 @@ fn scaled_rows(rows: &[Wrench<f64>], sizes: &[f64], scale: f64) -> DMatrix<f64> 
     })
 }
 
-/// Indices of the constraints that raise the rank at a pose, taken in the order of the legs: of all poses of largest rank those
-/// that are independent at the most poses.
+/// Indices of the constraints that raise the rank at a pose, taken in the order of the legs: of all poses of
+/// largest rank those that are independent at the most poses.
 fn independent_rows(mech: &Mechanism, poses: &[Pose<f64>]) -> Vec<usize> {
     let size = mech.characteristic_length;
     let at = |pose: &Pose<f64>| {
@@ -280,7 +282,8 @@ fn leg_screws(leg: &Leg, pose: &Pose<f64>) -> Vec<JointScrew> {
     screws
 }
 
-/// Links and joints as a graph: the base, the platform, rods, cylinders and pistons. A fixed joint makes one link of two.
+/// Links and joints as a graph: the base, the platform, rods, cylinders and pistons. A fixed joint makes one
+/// link of two.
 fn graph(mech: &Mechanism) -> Graph {
     let mut names: Vec<String> = vec!["base".into(), "platform".into()];
     let mut joints: Vec<GraphJoint> = Vec::new();
@@ -292,7 +295,8 @@ fn graph(mech: &Mechanism) -> Graph {
     }
     for leg in &mech.legs {
         let mut link = |joint: &Joint, body: usize, name: &str| {
-            // A joint F makes one link of two; what a drive below it moves is a link whatever the joint on it.
+            // A joint F makes one link of two; what a drive below it moves is a link whatever the joint on
+            // it.
             if joint.kind.is_fixed() && !leg.drive.moves_foot() {
                 return body;
             }

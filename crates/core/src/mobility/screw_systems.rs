@@ -94,8 +94,9 @@ fn simplest(turns: &[Twist<f64>], slides: &[Twist<f64>]) -> Option<Vec<Twist<f64
     Some((0..n).map(moved).collect())
 }
 
-/// The wrench of every constraint of every leg at a pose, of a unit force or else of a unit couple, with its line: axis, pitch
-/// (m, infinite for a couple), point. A constraint whose row vanishes has zeros, and no line.
+/// The wrench of every constraint of every leg at a pose, of a unit force or else of a unit couple, with its
+/// line: axis, pitch (m, infinite for a couple), point. A constraint whose row vanishes has zeros, and no
+/// line.
 #[must_use]
 pub fn constraints(mech: &Mechanism, pose: &Pose<f64>) -> Vec<(Wrench<f64>, Screw)> {
     let scale = mech.characteristic_length;

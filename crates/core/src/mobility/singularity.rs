@@ -1,5 +1,5 @@
 //! Singularity analysis at a pose: determinant, singular values, kind, uncontrolled twist \[T24\]
-//! \[T30\]-\[T33\].
+//! \[T30\] \[T31\] \[T32\] \[T33\].
 
 use nalgebra::{DMatrix, DVector};
 
@@ -13,8 +13,8 @@ use crate::numerics::svd::Svd;
 use crate::spatial::motion::pure_row;
 use crate::spatial::{Pose, Twist, Vec3};
 
-/// A singular value, a row's size, a leg's length or its sine (all pure numbers) counts as zero up to this much: poses
-/// may miss their constraints by as much of the characteristic length.
+/// A singular value, a row's size, a leg's length or its sine (all pure numbers) counts as zero up to this
+/// much: poses may miss their constraints by as much of the characteristic length.
 pub const TOLERANCE: f64 = 1e-6;
 
 /// Kind of a singularity, by the conditions of \[T32\]: the first that holds.
@@ -48,30 +48,32 @@ impl Kind {
         match self {
             Kind::None => "no singularity",
             Kind::LegLength => {
-                "inverse singularity: a leg has no length, so it has no direction, and its actuator moves nothing"
+                "inverse singularity: a leg has no length, so it has no direction, and its actuator moves \
+                 nothing"
             }
             Kind::StrutAcrossRail => {
                 "inverse singularity: the strut of a slider is perpendicular to its rail, so that its \
                  carriage moves the platform no longer, and two branches meet"
             }
             Kind::ConstraintVanishes => {
-                "constraint singularity: the wrench of a constraint vanishes (c = τ = 0, as where L ∥ l and r ∥ L), and the \
-                 platform gains a degree of freedom that no actuator controls"
+                "constraint singularity: the wrench of a constraint vanishes (c = τ = 0, as where L ∥ l and \
+                 r ∥ L), and the platform gains a degree of freedom that no actuator controls"
             }
             Kind::Constraint => {
-                "constraint singularity: the legs' constraint wrenches depend on one another, and the platform gains a \
-                 degree of freedom that no actuator controls"
+                "constraint singularity: the legs' constraint wrenches depend on one another, and the \
+                 platform gains a degree of freedom that no actuator controls"
             }
             Kind::LegFrame => {
                 "passive singularity: a leg lies along the axis of its universal joint or rod, so its \
                  rotation about itself is not determined"
             }
             Kind::Actuation => {
-                "direct singularity: with all actuators locked the platform can still move, and forces grow without limit"
+                "direct singularity: with all actuators locked the platform can still move, and forces grow \
+                 without limit"
             }
             Kind::DependentRows => {
-                "no singularity of the mechanism: the constraints that J holds depend on one another here, while redundant \
-                 ones that it leaves out hold the platform"
+                "no singularity of the mechanism: the constraints that J holds depend on one another here, \
+                 while redundant ones that it leaves out hold the platform"
             }
         }
     }
@@ -92,9 +94,11 @@ pub struct Conditioning {
 pub struct Singularity {
     pub determinant: f64,
     pub conditioning: Conditioning,
-    /// The smallest singular value of the constraints' rows that generic poses have; infinite without constraints.
+    /// The smallest singular value of the constraints' rows that generic poses have; infinite without
+    /// constraints.
     pub constraint_sigma: f64,
-    /// Length of each leg by the scale, and sine of the angle between it and the axis that its frame hangs on.
+    /// Length of each leg by the scale, and sine of the angle between it and the axis that its frame hangs
+    /// on.
     pub leg_length: Vec<f64>,
     pub leg_sine: Vec<f64>,
     /// Cosine of the angle between each leg and its prismatic joint: one for telescopic legs \[T68\].
@@ -124,7 +128,8 @@ pub struct Screw {
 /// zero.
 const DETERMINANT_ROUNDING: f64 = 4e-15;
 
-/// det J, zero within rounding, and its exact rate along a twist \[T30\]; det JᵀJ where J has more rows than columns \[T72\].
+/// det J, zero within rounding, and its exact rate along a twist \[T30\]; det JᵀJ where J has more rows than
+/// columns \[T72\].
 #[must_use]
 #[inline(always)]
 pub fn determinant<V: Ordered>(mech: &Mechanism, pose: &Pose<V>, twist: &Twist<V>, scale: f64) -> Dual<V> {
@@ -250,7 +255,7 @@ fn values_of(sigma: &[f64]) -> Conditioning {
 }
 
 /// Everything about a pose's nearness to a singularity, rotations counted as arcs at `scale`; a measure up to
-/// `tolerance` counts as zero \[T30\]-\[T33\].
+/// `tolerance` counts as zero \[T30\] \[T31\] \[T32\] \[T33\].
 #[must_use]
 pub fn singularity(mech: &Mechanism, pose: &Pose<f64>, scale: f64, tolerance: f64) -> Singularity {
     let positions: Vec<_> = mech.legs.iter().map(|leg| leg::position(leg, pose)).collect();

@@ -4,7 +4,8 @@
 use std::cell::Cell;
 use std::f64::consts::PI;
 
-use crate::kinematics::coordinate_sets::{self, CoordinateState, MAX_COORDINATES, Set, Values};
+use crate::kinematics::coordinate_sets::{MAX_COORDINATES, Set, Values};
+use crate::kinematics::dependent_coordinates::{self, CoordinateState};
 use crate::mobility::singularity::{self, Kind, TOLERANCE};
 use crate::model::mechanism::Mechanism;
 use crate::model::status::Status;
@@ -40,10 +41,12 @@ const STEPS: [f64; 3] = [PI / 180.0, 0.02, 0.01];
 const TURN: f64 = 2.0 * PI;
 const ACROSS: f64 = 2.0;
 
-/// Measures up to which the last pose before poses end is singular: near a fold poses go by the root of the coordinate.
+/// Measures up to which the last pose before poses end is singular: near a fold poses go by the root of the
+/// coordinate.
 const END_TOLERANCE: f64 = 1e-3;
 
-/// Shares of a step before a zero at which a pose is looked for in turn, and up to which its measures tell the kind.
+/// Shares of a step before a zero at which a pose is looked for in turn, and up to which its measures tell
+/// the kind.
 const SHORTLY_BEFORE: [f64; 5] = [1e-5, 1e-4, 1e-3, 1e-2, 1e-1];
 const NEAR: f64 = 0.01;
 
@@ -73,7 +76,8 @@ pub fn start(
     let q = search.set.values(mech, pose);
     let mut status = Status::NotConverged;
     for branch in [1.0, -1.0] {
-        let state = coordinate_sets::state(mech, &search.set, &q.map(Jet::lit), &mask(search), branch, pose);
+        let state =
+            dependent_coordinates::state(mech, &search.set, &q.map(Jet::lit), &mask(search), branch, pose);
         if state.status != Status::Ok {
             status = state.status;
         } else if same(&state.platform.pose, pose, search.scale) {
@@ -115,7 +119,14 @@ impl CoordinatePath<'_> {
     fn state(&self, way: f64) -> CoordinateState {
         let mut q = self.start.map(Jet::lit);
         q[self.index] = Jet::new(self.place(way), self.direction, 0.0);
-        coordinate_sets::state(self.mech, &self.search.set, &q, &self.given, self.branch, &self.last.get())
+        dependent_coordinates::state(
+            self.mech,
+            &self.search.set,
+            &q,
+            &self.given,
+            self.branch,
+            &self.last.get(),
+        )
     }
 
     fn pose(&self, way: f64) -> Option<Pose<f64>> {
@@ -123,7 +134,8 @@ impl CoordinatePath<'_> {
         (state.status == Status::Ok).then_some(state.platform.pose)
     }
 
-    /// det J and its rate, as long as dependent coordinates are on the branch `side`: beyond a fold is another path.
+    /// det J and its rate, as long as dependent coordinates are on the branch `side`: beyond a fold is
+    /// another path.
     fn node(&self, way: f64, side: f64) -> Option<Node> {
         let CoordinateState { platform, branch, status, .. } = self.state(way);
         if status != Status::Ok || branch != side {
@@ -140,8 +152,8 @@ impl CoordinatePath<'_> {
         Some(found.kind).filter(|&kind| kind != Kind::None)
     }
 
-    /// The kind where det J is zero. Where a constraint is lost the dependent coordinates are not determined: a pose
-    /// shortly before tells it then.
+    /// The kind where det J is zero. Where a constraint is lost the dependent coordinates are not determined:
+    /// a pose shortly before tells it then.
     fn kind_at_zero(&self, way: f64, step: f64) -> Option<Kind> {
         let here = self.pose(way).and_then(|pose| self.kind(&pose, TOLERANCE));
         here.or_else(|| {
@@ -152,7 +164,8 @@ impl CoordinatePath<'_> {
     }
 }
 
-/// The nearest singular pose when coordinate `index` goes from its value in `q` up (`direction` 1) or down (-1).
+/// The nearest singular pose when coordinate `index` goes from its value in `q` up (`direction` 1) or down
+/// (-1).
 #[must_use]
 pub fn along(
     mech: &Mechanism,

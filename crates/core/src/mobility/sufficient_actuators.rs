@@ -10,8 +10,9 @@ use crate::spatial::Pose;
 /// Remainder of a row below which it is rounding.
 const SINGULAR: f64 = 1e-12;
 
-/// The mechanism with so many of its actuated legs passive that J is square, best conditioned at one of a few generic poses:
-/// rows are chosen one by one, that with the largest rest. None for a mechanism that is singular by design.
+/// The mechanism with so many of its actuated legs passive that J is square, best conditioned at one of a few
+/// generic poses: rows are chosen one by one, that with the largest rest. None for a mechanism that is
+/// singular by design.
 #[must_use]
 pub fn sufficient_actuators(mech: &Mechanism) -> Option<Mechanism> {
     let numbers: Vec<usize> = mech.actuated().map(|(k, _)| k).collect();

@@ -16,7 +16,8 @@ pub enum Drive<S = f64> {
 #[derive(Clone, Copy, Debug)]
 pub struct Telescope;
 
-/// The strut's foot, along a rail fixed in the base: the coordinate is its place q from B. The strut is rigid.
+/// The strut's foot, along a rail fixed in the base: the coordinate is its place q from B. The strut is
+/// rigid.
 #[derive(Clone, Copy, Debug)]
 pub struct Slider<S = f64> {
     /// Unit vector a, base axes.

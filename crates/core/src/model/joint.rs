@@ -38,7 +38,8 @@ impl JointKind {
     pub const ALL: [Self; 4] =
         [JointKind::Spherical, JointKind::Universal, JointKind::Revolute, JointKind::Fixed];
 
-    /// The kind of a base joint that a rod carries, and what it makes of rod and leg together, seen from the leg.
+    /// The kind of a base joint that a rod carries, and what it makes of rod and leg together, seen from the
+    /// leg.
     pub const ON_ROD: Self = JointKind::Revolute;
     pub const WITH_ROD: Self = JointKind::Universal;
 
@@ -149,7 +150,8 @@ pub struct Joint<S = f64> {
     pub kind: JointKind,
     /// In the axes of its body, m.
     pub point: Vec3<S>,
-    /// Unit axis in the axes of its body: U, the axis fixed to that body; R, its axis; F, the leg's direction.
+    /// Unit axis in the axes of its body: U, the axis fixed to that body; R, its axis; F, the leg's
+    /// direction.
     pub axis: Option<Vec3<S>>,
     /// F: the leg's n.
     pub normal: Option<Vec3<S>>,

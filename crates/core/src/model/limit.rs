@@ -55,7 +55,8 @@ pub enum Bound {
     Between(f64, f64),
 }
 
-/// A leg's normal n and direction δ at the home pose, in base axes and in platform axes: where angles are zero.
+/// A leg's normal n and direction δ at the home pose, in base axes and in platform axes: where angles are
+/// zero.
 #[derive(Clone, Copy, Debug)]
 pub struct Zero {
     pub(crate) base: (Vec3<f64>, Vec3<f64>),

@@ -77,7 +77,8 @@ pub struct Leg<S = f64> {
     pub radius: Option<f64>,
     pub base: Joint<S>,
     pub platform: Joint<S>,
-    /// The rod that carries the base joint. Seen from the leg the joint is then U with the rod's line as its axis.
+    /// The rod that carries the base joint. Seen from the leg the joint is then U with the rod's line as its
+    /// axis.
     pub rod: Option<usize>,
     /// Centre measured from B, in leg axes. Of a slider: the carriage, in base axes, which does not rotate.
     pub cylinder: Body,

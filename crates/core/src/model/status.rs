@@ -30,7 +30,8 @@ pub enum Status {
     OutOfAngle = 11,
     /// The strut of a slider is too short to reach its rail.
     OutOfReach = 12,
-    /// The pose has the coordinates of its legs, but the strut of a slider leans to the other side; the pose stands.
+    /// The pose has the coordinates of its legs, but the strut of a slider leans to the other side; the pose
+    /// stands.
     OtherBranch = 13,
     /// The legs contradict one another: nothing has all that is asked of them.
     Inconsistent = 14,
@@ -71,59 +72,61 @@ impl Status {
         match self {
             Status::Ok => "ok",
             Status::NoBranch => {
-                "no pose has these coordinates: the constraint leaves no real dependent coordinate (|cos γ| > 1, Eq. 5); \
-                 change them together, or use natural coordinates"
+                "no pose has these coordinates: the constraint leaves no real dependent coordinate (|cos γ| \
+                 > 1, Eq. 5); change them together, or use natural coordinates"
             }
             Status::Fold => {
-                "the coordinates do not determine the motion here: two of their branches meet (of the paper's where γ = 0 or 180°), or \
-                 they depend on one another at every pose; the mechanism need not be singular, other coordinates may pass: \
-                 `polypod info` lists independent ones"
+                "the coordinates do not determine the motion here: two of their branches meet (of the \
+                 paper's where γ = 0 or 180°), or they depend on one another at every pose; the mechanism \
+                 need not be singular, other coordinates may pass: `polypod info` lists independent ones"
             }
             Status::NotConverged => {
                 "no pose was found from the guess; give a guess nearer to the pose or check that it exists"
             }
             Status::Singular => {
-                "singular to working precision: a leg has no length or lies along the axis of its joint, or the \
-                 Jacobian does not determine forces and velocities at this pose"
+                "singular to working precision: a leg has no length or lies along the axis of its joint, or \
+                 the Jacobian does not determine forces and velocities at this pose"
             }
             Status::OutOfStroke => {
                 "a leg is outside its stroke; the numbers stand, the machine cannot reach the pose"
             }
             Status::OffConstraint => {
-                "the pose, twist or acceleration breaks a constraint of the mechanism; give only as many coordinates as it \
-                 has degrees of freedom, so that the others follow (mech.state makes pose, twist and \
-                 acceleration)"
+                "the pose, twist or acceleration breaks a constraint of the mechanism; give only as many \
+                 coordinates as it has degrees of freedom, so that the others follow (mech.state makes pose, \
+                 twist and acceleration)"
             }
             Status::BranchJump => {
-                "between the state before and this one the dependent coordinates passed a fold and came out on \
-                 another branch; take smaller steps, or coordinates without this fold"
+                "between the state before and this one the dependent coordinates passed a fold and came out \
+                 on another branch; take smaller steps, or coordinates without this fold"
             }
             Status::OutOfCone => {
                 "a joint rotates beyond its cone limit; the numbers stand, the machine cannot reach the pose"
             }
             Status::ModeJump => {
-                "on the way from the guess to these lengths its assembly mode ends in a singularity; the pose has the \
-                 lengths but lies in another mode: give a guess in the mode that is meant, or ask for all assembly modes"
+                "on the way from the guess to these lengths its assembly mode ends in a singularity; the \
+                 pose has the lengths but lies in another mode: give a guess in the mode that is meant, or \
+                 ask for all assembly modes"
             }
             Status::OutOfAngle => {
-                "a revolute joint or a rod rotates beyond its range; the numbers stand, the machine cannot reach the \
-                 pose"
+                "a revolute joint or a rod rotates beyond its range; the numbers stand, the machine cannot \
+                 reach the pose"
             }
             Status::OutOfReach => {
                 "the strut of a slider is too short: from this pose it reaches its rail nowhere"
             }
             Status::OtherBranch => {
                 "the pose has the coordinates of its legs, but the strut of a slider leans to the other \
-                 side of the perpendicular to its rail than its branch says; give a guess nearer to the pose that is meant"
+                 side of the perpendicular to its rail than its branch says; give a guess nearer to the \
+                 pose that is meant"
             }
             Status::Inconsistent => {
-                "the legs contradict one another: no pose nearby has all these lengths, or no motion all these rates or \
-                 accelerations; more legs are actuated than the platform has degrees of freedom, so that they must \
-                 agree (1e-6)"
+                "the legs contradict one another: no pose nearby has all these lengths, or no motion all \
+                 these rates or accelerations; more legs are actuated than the platform has degrees of \
+                 freedom, so that they must agree (1e-6)"
             }
             Status::Backwards => {
-                "a leg points backwards from its fixed joint (F), so that its length would be negative: the machine cannot be \
-                 there; give a pose or a guess on the side of home"
+                "a leg points backwards from its fixed joint (F), so that its length would be negative: the \
+                 machine cannot be there; give a pose or a guess on the side of home"
             }
             Status::InvalidInput => {
                 "the input holds NaN or infinity, or its rotation is not a rotation matrix"

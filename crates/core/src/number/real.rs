@@ -1,11 +1,11 @@
 //! Number types: the traits and types over which every equation is generic.
 //!
-//! [`Real`] is what a kernel may use: field operations, a square root, and [`Real::select`] in place of a branch.
-//! `f64` and [`F`] are numbers; [`Dual`] carries one derivative along, [`Jet`] a rate and a second rate, so that the
-//! same source gives values, exact derivatives and exact time histories.
-//! [`Trig`] adds what only coordinate sets and joint angles need, [`Scalar`] names the numbers of a single state, which may
-//! be branched on.
-//! Complex numbers and lanes of numbers are in [`complex`](crate::number::complex) and [`lanes`](crate::number::lanes).
+//! [`Real`] is what a kernel may use: field operations, a square root, and [`Real::select`] in place of a
+//! branch. `f64` and [`F`] are numbers; [`Dual`] carries one derivative along, [`Jet`] a rate and a second
+//! rate, so that the same source gives values, exact derivatives and exact time histories. [`Trig`] adds what
+//! only coordinate sets and joint angles need, [`Scalar`] names the numbers of a single state, which may be
+//! branched on. Complex numbers and lanes of numbers are in [`complex`](crate::number::complex) and
+//! [`lanes`](crate::number::lanes).
 
 use std::fmt::Debug;
 use std::ops::{Add, Div, Mul, Neg, Sub};
@@ -123,8 +123,8 @@ pub fn count(n: usize) -> f64 {
     u32::try_from(n).map_or(f64::INFINITY, f64::from)
 }
 
-/// A number of the mechanism, a constant to the kernels' number `T`: a double, or one that carries its derivative by a
-/// number of the geometry, for kernels whose numbers carry that as well \[T56\].
+/// A number of the mechanism, a constant to the kernels' number `T`: a double, or one that carries its
+/// derivative by a number of the geometry, for kernels whose numbers carry that as well \[T56\].
 pub trait Constant<T: Real>: Scalar {
     fn lift(self) -> T;
 
@@ -203,7 +203,8 @@ impl Ordered for f64 {
     }
 }
 
-/// A double whose `mul_add` is one fused instruction when `FMA` (for code compiled with that feature), else two.
+/// A double whose `mul_add` is one fused instruction when `FMA` (for code compiled with that feature), else
+/// two.
 #[derive(Clone, Copy, Debug, PartialEq, PartialOrd)]
 #[repr(transparent)]
 pub struct F<const FMA: bool>(pub f64);
@@ -459,7 +460,8 @@ impl<T: Trig> Trig for Jet<T> {
     }
     #[inline(always)]
     fn atan2(self, b: Self) -> Self {
-        // The rate of the angle of (b, self) is (self' b - self b') / (self² + b²): one quotient, differentiated once.
+        // The rate of the angle of (b, self) is (self' b - self b') / (self² + b²): one quotient,
+        // differentiated once.
         let square = self * self + b * b;
         let area = self.d * b.x - self.x * b.d;
         let area_rate = self.dd * b.x - self.x * b.dd;

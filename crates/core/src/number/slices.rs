@@ -1,7 +1,8 @@
 //! Copies, fills and pairs for kernels, as loops that are inlined.
 //!
-//! Functions of the standard library for slices are not all inlined across codegen units: they would be called, and what they
-//! do to registers would be done in memory, without the instructions that the kernel is compiled for.
+//! Functions of the standard library for slices are not all inlined across codegen units: they would be
+//! called, and what they do to registers would be done in memory, without the instructions that the kernel is
+//! compiled for.
 
 /// Sets numbers to others, of which there must be as many.
 #[inline(always)]

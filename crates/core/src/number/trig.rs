@@ -1,8 +1,9 @@
 //! Sine, cosine, arc cosine and the angle of a point, from the operations of [`Ordered`] alone.
 //!
-//! One source for single numbers and for lanes: no branch, no table, and nothing that could be fused, so that an angle is the same
-//! bits on every width and every platform. The polynomials are minimax fits of the relative error (Remez), with the
-//! coefficients rounded to doubles from the lowest power on; the error of each fit is given with it.
+//! One source for single numbers and for lanes: no branch, no table, and nothing that could be fused, so that
+//! an angle is the same bits on every width and every platform. The polynomials are minimax fits of the
+//! relative error (Remez), with the coefficients rounded to doubles from the lowest power on; the error of
+//! each fit is given with it.
 
 // Digits that name one double are not for reading.
 #![allow(clippy::unreadable_literal)]
@@ -57,7 +58,8 @@ const ATAN: [f64; 10] = [
 /// atan 1/2 as a multiple of 2^-51, and the rest.
 const ATAN_HALF: [f64; 2] = [0.46364760900080615, -3.281237377829614e-17];
 
-/// 2^200: points farther out than this are brought nearer before coordinates are added, all others moved away.
+/// 2^200: points farther out than this are brought nearer before coordinates are added, all others moved
+/// away.
 const FAR: f64 = (1_u128 << 100) as f64 * (1_u128 << 100) as f64;
 
 /// 2^-1000, less than the rounding of any coordinate so moved but zero: it makes 0/0 a zero.
@@ -82,14 +84,15 @@ const ASIN: [f64; 13] = [
 
 /// Sine and cosine of an angle in radians.
 ///
-/// Within 1 ulp for |x| up to 1e5, beyond that those of an angle within |x| 2^-53 of it; NaN from 2^51 on, where the
-/// double itself is no nearer to the angle than a quarter of a radian.
+/// Within 1 ulp for |x| up to 1e5, beyond that those of an angle within |x| 2^-53 of it; NaN from 2^51 on,
+/// where the double itself is no nearer to the angle than a quarter of a radian.
 #[inline(always)]
 pub fn sin_cos<T: Ordered>(x: T) -> (T, T) {
     let one = T::one();
     let x = T::select(T::lit(LARGEST).greater(x.abs()), x, T::lit(f64::NAN));
 
-    // x = n π/2 + r - low. The first difference is exact, so is the rounding of the second that goes into the rest.
+    // x = n π/2 + r - low. The first difference is exact, so is the rounding of the second that goes into the
+    // rest.
     let n = nearest(x.scale(FRAC_2_PI));
     let first = x - n.scale(HALF_PI[0]);
     let second = n.scale(HALF_PI[1]);
@@ -120,7 +123,8 @@ pub fn sin_cos<T: Ordered>(x: T) -> (T, T) {
 pub fn atan2<T: Ordered>(y: T, x: T) -> T {
     let zero = T::zero();
 
-    // The slope in the octant next to the x axis: short / long, neither so large nor so small that digits are lost.
+    // The slope in the octant next to the x axis: short / long, neither so large nor so small that digits are
+    // lost.
     let (a, b) = (y.abs(), x.abs());
     let steep = a.greater(b);
     let (short, long) = (T::select(steep, b, a), T::select(steep, a, b));
@@ -143,8 +147,8 @@ pub fn atan2<T: Ordered>(y: T, x: T) -> T {
     let from = of(0.0, ATAN_HALF[0], FRAC_PI_4);
     let from_rest = of(0.0, ATAN_HALF[1], FRAC_PI_4 * PI_REST);
 
-    // The octant: a multiple of π/2, and the angle from there to one side or the other. Both it and `from` are
-    // multiples of 2^-51, so that their sum is exact.
+    // The octant: a multiple of π/2, and the angle from there to one side or the other. Both it and `from`
+    // are multiples of 2^-51, so that their sum is exact.
     let forward = x.signum();
     let back = zero.greater(forward);
     let axis = T::select(steep, T::lit(FRAC_PI_2), T::select(back, T::lit(PI), zero));
@@ -259,7 +263,8 @@ mod tests {
             check_sin_cos(x * 1e5);
             check_sin_cos(x * (-draw.number().abs() * 1000.0).exp2());
         }
-        // Next to the multiples of a quarter turn hardly a digit of the angle remains; between them octants meet.
+        // Next to the multiples of a quarter turn hardly a digit of the angle remains; between them octants
+        // meet.
         for n in 0..130_000 {
             let x = f64::from(n) * FRAC_PI_4;
             for x in [x.next_down(), x, x.next_up()] {

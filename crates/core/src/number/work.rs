@@ -1,8 +1,9 @@
 //! Parts of a computation that are functions of their own, compiled for each kind of register.
 //!
-//! Instructions of AVX are inlined only into functions that are compiled for AVX, so that in these all operands lie in memory
-//! until then. The compiler's time to bring them into registers grows with the square of the function's length: long functions
-//! are divided into works. Numbers that are no registers do a work where they stand.
+//! Instructions of AVX are inlined only into functions that are compiled for AVX, so that in these all
+//! operands lie in memory until then. The compiler's time to bring them into registers grows with the square
+//! of the function's length: long functions are divided into works. Numbers that are no registers do a work
+//! where they stand.
 
 /// What is to be done with numbers of one kind; its functions of their own are methods for the reason of
 /// [`Task`](crate::number::lanes::Task)'s.
@@ -40,7 +41,8 @@ pub trait Work<V>: Sized {
     }
 }
 
-/// A work with its fields, its result and what it does, which [`Real::apart`](crate::number::real::Real::apart) calls.
+/// A work with its fields, its result and what it does, which
+/// [`Real::apart`](crate::number::real::Real::apart) calls.
 macro_rules! work {
     (
         $(#[$doc:meta])*

@@ -6,8 +6,8 @@ use crate::number::real::{Ordered, Real};
 #[derive(Clone, Copy, Debug)]
 pub struct Solved<T: Real, X> {
     pub x: X,
-    /// Ratio of the smallest to the largest pivot: zero (or NaN) where the matrix is singular, of the order of the
-    /// reciprocal condition number elsewhere.
+    /// Ratio of the smallest to the largest pivot: zero (or NaN) where the matrix is singular, of the order
+    /// of the reciprocal condition number elsewhere.
     pub pivots: T::Value,
     /// Sign of the determinant.
     pub sign: T::Value,
@@ -44,8 +44,8 @@ macro_rules! for_six {
     }};
 }
 
-/// Solves the first `size` equations in as many unknowns for several right-hand sides by Gaussian elimination with
-/// partial pivoting, rows exchanged by [`Real::select`]; the rest is not read.
+/// Solves the first `size` equations in as many unknowns for several right-hand sides by Gaussian elimination
+/// with partial pivoting, rows exchanged by [`Real::select`]; the rest is not read.
 #[inline(always)]
 pub fn solve_first<T: Real, const N: usize, const M: usize>(
     mut m: [[T; N]; N],
@@ -115,8 +115,9 @@ fn eliminate<T: Real, const N: usize, const M: usize>(
     }
 }
 
-/// The determinant by expansion along the rows, each minor once: `d[S]` is that of the first |S| rows and the columns
-/// in the bit set S. No division, so that with duals the rate is exact at singular matrices of any rank too.
+/// The determinant by expansion along the rows, each minor once: `d[S]` is that of the first |S| rows and the
+/// columns in the bit set S. No division, so that with duals the rate is exact at singular matrices of any
+/// rank too.
 #[inline(always)]
 pub fn determinant<T: Real>(m: &[[T; 6]; 6]) -> T {
     let mut d = [T::zero(); 64];

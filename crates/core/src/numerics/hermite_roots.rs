@@ -17,7 +17,8 @@ pub enum Event {
     Dip,
 }
 
-/// Zeros and near misses of the cubics through points in order, with the place of each. Points without a value are passed over.
+/// Zeros and near misses of the cubics through points in order, with the place of each. Points without a
+/// value are passed over.
 ///
 /// Two zeros nearer to each other than `resolution` are one that is touched: rounding makes two of one.
 #[must_use]
@@ -29,7 +30,8 @@ pub fn events(nodes: &[Node], resolution: f64) -> Vec<(f64, Event)> {
         let (before, after) = (i.checked_sub(1).map(|j| known[j]), known.get(i + 1));
         let rising = if node.d.is_finite() { node.d } else { 0.0 };
         let sides = match (before, after) {
-            // Where it is zero, its rate tells on which side it comes from, or where it comes from as far as is known.
+            // Where it is zero, its rate tells on which side it comes from, or where it comes from as far as
+            // is known.
             _ if node.f != 0.0 => [node.f; 2],
             _ if rising != 0.0 => [-rising, rising],
             (_, after) => [sign_before, after.map_or(0.0, |n| n.f)],
@@ -54,7 +56,8 @@ pub fn events(nodes: &[Node], resolution: f64) -> Vec<(f64, Event)> {
 /// Change between two points that is rounding: the function is a pure number of the order of one.
 const ROUNDING: f64 = 1e-13;
 
-/// Neighbours that are both zero and do not move away from it lie in a stretch of zeros: what their rates say is rounding.
+/// Neighbours that are both zero and do not move away from it lie in a stretch of zeros: what their rates say
+/// is rounding.
 fn without_noise(mut known: Vec<Node>) -> Vec<Node> {
     for i in 1..known.len() {
         let (a, b) = (known[i - 1], known[i]);
@@ -184,7 +187,8 @@ pub struct FoundRoots {
 /// Rounds of looking closer at one step before the cubics must have settled.
 const ROUNDS: usize = 40;
 
-/// The first zero of a function from 0 on, followed in steps up to `reach`. A dip is a zero where `touches` says so.
+/// The first zero of a function from 0 on, followed in steps up to `reach`. A dip is a zero where `touches`
+/// says so.
 pub fn first_zero(
     mut at: impl FnMut(f64) -> Option<Node>,
     mut touches: impl FnMut(f64) -> bool,
@@ -214,7 +218,8 @@ pub fn first_zero(
     FoundRoots { zero: None, end: from.t }
 }
 
-/// The first zero of one step: the function is evaluated where the cubics have events until these stay where they are.
+/// The first zero of one step: the function is evaluated where the cubics have events until these stay where
+/// they are.
 fn zero_within(
     at: &mut impl FnMut(f64) -> Option<Node>,
     touches: &mut impl FnMut(f64) -> bool,
@@ -246,7 +251,8 @@ pub const RESOLUTION: f64 = 1e-4;
 #[derive(Clone, Copy, Debug)]
 pub struct Precision {
     pub crossing: f64,
-    /// An extreme is known less well than a zero, by about the square root of the rounding; its value is known well.
+    /// An extreme is known less well than a zero, by about the square root of the rounding; its value is
+    /// known well.
     pub dip: f64,
     pub resolution: f64,
 }

@@ -1,16 +1,18 @@
-//! Householder factorisation of a matrix with no more rows than columns: solutions of least norm, least squares with its
-//! transpose, and its null space (Golub and Van Loan, Matrix Computations, sections 5.2 and 5.5). No branch on a value,
-//! and no allocation once it is made.
+//! Householder factorisation of a matrix with no more rows than columns: solutions of least norm, least
+//! squares with its transpose, and its null space (Golub and Van Loan, Matrix Computations, sections 5.2 and
+//! 5.5). No branch on a value, and no allocation once it is made.
 
 use crate::number::real::Ordered;
 use crate::number::slices;
 
-/// `m = L Qᵀ` of a matrix with no more rows than columns: L lower triangular, Q a product of Householder reflections.
+/// `m = L Qᵀ` of a matrix with no more rows than columns: L lower triangular, Q a product of Householder
+/// reflections.
 #[derive(Clone, Debug)]
 pub struct Householder<V> {
     rows: usize,
     columns: usize,
-    /// Row by row: the matrix; once factored, L below the diagonal and each reflection's vector from there on.
+    /// Row by row: the matrix; once factored, L below the diagonal and each reflection's vector from there
+    /// on.
     entries: Vec<V>,
     /// Reciprocals of L's diagonal.
     inverses: Vec<V>,
@@ -64,7 +66,8 @@ impl<V: Ordered> Householder<V> {
             for j in k..columns {
                 square = v[j].mul_add(v[j], square);
             }
-            // The reflection that turns the row into (.., -sign(v_k) |v|, 0, ..): no difference of nearly equal numbers.
+            // The reflection that turns the row into (.., -sign(v_k) |v|, 0, ..): no difference of nearly
+            // equal numbers.
             let (norm, first) = (square.sqrt(), v[k]);
             let sign = first.signum();
             self.square = self.square + square;
@@ -148,8 +151,9 @@ impl<V: Ordered> Householder<V> {
         }
     }
 
-    /// `1/(|L| |L⁻¹|)` with the root of the sum of squares for a size: at most the smallest singular value by the largest,
-    /// and no less than that by the number of rows. Zero or NaN where rows depend on one another.
+    /// `1/(|L| |L⁻¹|)` with the root of the sum of squares for a size: at most the smallest singular value by
+    /// the largest, and no less than that by the number of rows. Zero or NaN where rows depend on one
+    /// another.
     #[inline(always)]
     pub fn reciprocal_condition(&mut self) -> V {
         let mut inverse = V::zero();

@@ -1,9 +1,11 @@
-//! The singular value decomposition, by rotations of pairs of columns until all are orthogonal (one-sided Jacobi;
-//! Golub and Van Loan, Matrix Computations, section 8.6.3). Slower on large matrices than a reduction to two diagonals,
-//! but every step is a rotation, so that nothing can go wrong unseen: whatever is left shows as an angle between columns.
+//! The singular value decomposition, by rotations of pairs of columns until all are orthogonal (one-sided
+//! Jacobi; Golub and Van Loan, Matrix Computations, section 8.6.3). Slower on large matrices than a reduction
+//! to two diagonals, but every step is a rotation, so that nothing can go wrong unseen: whatever is left
+//! shows as an angle between columns.
 //!
-//! Why not nalgebra's: version 0.35.0 gives wrong values for some matrices without full rank, which are those that matter here,
-//! and does not say so (`findings/nalgebra-svd.sh`: one random 7×6 matrix of rank 2 in twenty).
+//! Why not nalgebra's: version 0.35.0 gives wrong values for some matrices without full rank, which are those
+//! that matter here, and does not say so (`findings/nalgebra-svd.sh`: one random 7×6 matrix of rank 2 in
+//! twenty).
 
 use nalgebra::{DMatrix, DVector};
 

@@ -43,7 +43,8 @@ mod x86 {
     pub(super) fn copy(numbers: &[MaybeUninit<f64>], places: &mut [MaybeUninit<f64>]) {
         let (from, to) = (numbers.as_ptr().cast::<f64>(), places.as_mut_ptr().cast::<f64>());
         for k in (0..numbers.len()).step_by(2) {
-            // SAFETY: both have so many numbers, all written, `to` begins a line, and every processor of this kind has the instructions.
+            // SAFETY: both have so many numbers, all written, `to` begins a line, and every processor of this
+            // kind has the instructions.
             unsafe { _mm_stream_pd(to.add(k), _mm_loadu_pd(from.add(k))) };
         }
     }

@@ -101,7 +101,8 @@ impl<T: Real> Line<T> {
     }
 }
 
-/// Squared distance from the first segment to the point of the second that is nearest to its line, brought to its ends.
+/// Squared distance from the first segment to the point of the second that is nearest to its line, brought to
+/// its ends.
 #[inline(always)]
 fn across<T: Real>(a: &Line<T>, b: &Line<T>) -> T {
     let (u, v, w) = (a.vector, b.vector, a.ends[0] - b.ends[0]);
@@ -112,9 +113,10 @@ fn across<T: Real>(a: &Line<T>, b: &Line<T>) -> T {
 
 /// Squared distance between two segments.
 ///
-/// The squared distance is a convex function on a square of shares (s, t): its minimum is inside, where both of its
-/// derivatives vanish, or at an edge, which is an end of one segment against the other. For parallel segments
-/// the inner point is not determined, but then an edge is as low; any point of the square will do as a candidate.
+/// The squared distance is a convex function on a square of shares (s, t): its minimum is inside, where both
+/// of its derivatives vanish, or at an edge, which is an end of one segment against the other. For parallel
+/// segments the inner point is not determined, but then an edge is as low; any point of the square will do as
+/// a candidate.
 #[inline(always)]
 fn squared_distance<T: Real>(a: &Line<T>, b: &Line<T>) -> T {
     let from_a = least(b.to_point(a.ends[0]), b.to_point(a.ends[1]));
@@ -162,8 +164,8 @@ impl Facet {
         Vec3::lift(self.normal).dot(p - Vec3::lift(self.corners[0]))
     }
 
-    /// How far within the nearest side of a polygon the point's foot in the plane is, negative outside; in a unit of
-    /// each side's own.
+    /// How far within the nearest side of a polygon the point's foot in the plane is, negative outside; in a
+    /// unit of each side's own.
     #[inline(always)]
     fn depth<T: Real>(&self, p: Vec3<T>) -> T::Value {
         let mut depth = T::Value::lit(f64::INFINITY);
@@ -314,7 +316,8 @@ mod tests {
         Vec3::new(x, y, z)
     }
 
-    /// The least distance from a segment over a fine grid of its points, each to the nearest of what `to` gives.
+    /// The least distance from a segment over a fine grid of its points, each to the nearest of what `to`
+    /// gives.
     fn by_search(s: &Segment<f64>, to: impl Fn(Vec3<f64>) -> f64) -> f64 {
         (0..=4000).map(|i| to(s.at(f64::from(i) / 4000.0))).fold(f64::INFINITY, f64::min)
     }

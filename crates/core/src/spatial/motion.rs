@@ -64,7 +64,8 @@ pub struct Acceleration<T> {
     pub eps: Vec3<T>,
 }
 
-/// (F, T) on the platform at o; also a row of the Jacobian, whose product with the twist is a power or a rate.
+/// (F, T) on the platform at o; also a row of the Jacobian, whose product with the twist is a power or a
+/// rate.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Wrench<T> {
     pub force: Vec3<T>,

@@ -25,7 +25,8 @@ const PROGRESS: f64 = 0.9;
 /// Damping of the least squares, as a pure number: it keeps steps finite where rows depend on one another.
 const DAMPING: f64 = 1e-12;
 
-/// The rotation next to that of `pose` with which the platform can be at `o`; none where the search finds none.
+/// The rotation next to that of `pose` with which the platform can be at `o`; none where the search finds
+/// none.
 ///
 /// Gauss-Newton steps on the constraints and on the limits that are passed, of least size: what need not
 /// rotate does not. Limits that are no function of the pose alone in closed form (conditioning, forces) are
@@ -95,8 +96,8 @@ fn gradient(mech: &Mechanism, limit: &Limit, pose: &Pose<f64>) -> Vec3<f64> {
     Vec3::new(along(Vec3::X), along(Vec3::Y), along(Vec3::Z))
 }
 
-/// Whether no leg points backwards and a pose keeps the limits of conditioning and force; the latter at rest under the
-/// mechanism's own load.
+/// Whether no leg points backwards and a pose keeps the limits of conditioning and force; the latter at rest
+/// under the mechanism's own load.
 fn checked(mech: &Mechanism, pose: &Pose<f64>) -> bool {
     let forwards = mech.directions.iter().all(|direction| leg::ahead(mech, direction, pose) > 0.0);
     let kept = |limit: &Limit| {

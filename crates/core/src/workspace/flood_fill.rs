@@ -1,5 +1,5 @@
-//! The reachable workspace in pose space: the nodes of a grid at which the platform's point o can be, found from a start
-//! pose outwards, and where its boundary cuts the edges of the grid \[T40\].
+//! The reachable workspace in pose space: the nodes of a grid at which the platform's point o can be, found
+//! from a start pose outwards, and where its boundary cuts the edges of the grid \[T40\].
 
 use std::collections::BTreeMap;
 
@@ -102,8 +102,9 @@ impl Flood {
         })
     }
 
-    /// Tries every unreached neighbour of the nodes that the last wave reached; the number of new ones. Each is tried from
-    /// what was known before the wave, so that the result does not depend on the number of threads.
+    /// Tries every unreached neighbour of the nodes that the last wave reached; the number of new ones. Each
+    /// is tried from what was known before the wave, so that the result does not depend on the number of
+    /// threads.
     pub fn wave(&mut self, mech: &Mechanism) -> usize {
         let mut candidates: Vec<usize> = self
             .fresh
@@ -141,8 +142,8 @@ impl Flood {
         self.fresh.len()
     }
 
-    /// Tries every unreached neighbour of the reached nodes once more, in small pieces of the way; the number of new
-    /// ones. From them waves may go on.
+    /// Tries every unreached neighbour of the reached nodes once more, in small pieces of the way; the number
+    /// of new ones. From them waves may go on.
     pub fn retry(&mut self, mech: &Mechanism) -> usize {
         let open = self.open();
         // A node that several neighbours reach is reached once, from the last of them.
@@ -171,7 +172,8 @@ impl Flood {
         }
     }
 
-    /// The edges between reached and unreached nodes, those out of the grid too: reached node, direction, rotation.
+    /// The edges between reached and unreached nodes, those out of the grid too: reached node, direction,
+    /// rotation.
     fn open(&self) -> Vec<(usize, usize, Mat3<f64>)> {
         self.rotations
             .iter()
@@ -250,8 +252,8 @@ pub enum Stop {
     Search,
 }
 
-/// A pose at `o` from one nearby, if there is one, at once or in pieces; with the sign of det J kept at the end of each
-/// piece, if it is given.
+/// A pose at `o` from one nearby, if there is one, at once or in pieces; with the sign of det J kept at the
+/// end of each piece, if it is given.
 fn moved(mech: &Mechanism, pose: &Pose<f64>, o: Vec3<f64>, kept: Option<f64>) -> Option<Pose<f64>> {
     let step =
         |pose: &Pose<f64>, o| fit(mech, pose, o).filter(|p| kept.is_none_or(|kept| sign(mech, p) == kept));

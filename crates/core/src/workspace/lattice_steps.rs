@@ -1,5 +1,5 @@
-//! Steps from poses to other lengths, many side by side in lanes \[T41\], \[T65\]: where each leads to first order, and
-//! the way itself, followed to its end.
+//! Steps from poses to other lengths, many side by side in lanes \[T41\], \[T65\]: where each leads to first
+//! order, and the way itself, followed to its end.
 
 use crate::forward_kinematics::newton::{LegTarget, step_of, system};
 use crate::forward_kinematics::newton_lanes::{ARRIVED, BEGINNING, GOING, NewtonStep, Piece, Pieces, newton};
@@ -14,8 +14,9 @@ use crate::spatial::packed_poses::{Poses, get, load, put, store};
 use crate::spatial::{Mat3, Pose, Vec3};
 use crate::workspace::fit_orientation::{ON_LIMIT, margins};
 
-/// Shortest pieces of the way to a neighbour: what needs shorter ones is taken to end there. Near a singularity poses go
-/// by the root of the lengths, so that the end is known to an eighth of what one step makes there.
+/// Shortest pieces of the way to a neighbour: what needs shorter ones is taken to end there. Near a
+/// singularity poses go by the root of the lengths, so that the end is known to an eighth of what one step
+/// makes there.
 const PIECES: u32 = 64;
 
 /// Share of a predicted step within which a known pose is the one that the step leads to.
@@ -45,8 +46,8 @@ pub(super) struct Room<'a> {
 }
 
 impl Room<'_> {
-    /// Whether a pose is in the bounds and keeps all limits. The lengths of a node on the stroke's end are there up to
-    /// rounding.
+    /// Whether a pose is in the bounds and keeps all limits. The lengths of a node on the stroke's end are
+    /// there up to rounding.
     pub(super) fn holds(&self, pose: &Pose<f64>) -> bool {
         self.joints_hold(pose) > 0.0 && self.others_hold(pose)
     }
@@ -109,8 +110,8 @@ impl Predicted {
     }
 }
 
-/// Predicts, from at most [`WIDTH`] poses, the ends of steps by the first Newton step. `changes` are those of the
-/// squared lengths, for both directions of each axis.
+/// Predicts, from at most [`WIDTH`] poses, the ends of steps by the first Newton step. `changes` are those of
+/// the squared lengths, for both directions of each axis.
 pub(super) fn predict(
     mech: &Mechanism,
     poses: &[Pose<f64>],
@@ -218,15 +219,16 @@ impl Way {
         halved
     }
 
-    /// Goes on from the end of a piece: to the end of the half of the way, of the quarter, ..., that begins there.
+    /// Goes on from the end of a piece: to the end of the half of the way, of the quarter, ..., that begins
+    /// there.
     fn arrive(&mut self, pose: Pose<f64>) {
         (self.pose, self.share) = (pose, self.share + self.piece);
         self.piece = 1 << self.share.trailing_zeros();
     }
 }
 
-/// Follows ways by Newton's method, and where that does not contract or leaves room or aspect, in halves, each in the
-/// same manner \[T27\]. `tell` is told what is met, with the number of the way.
+/// Follows ways by Newton's method, and where that does not contract or leaves room or aspect, in halves,
+/// each in the same manner \[T27\]. `tell` is told what is met, with the number of the way.
 pub(super) fn follow(room: Room<'_>, ways: impl Iterator<Item = Way>, tell: impl FnMut(usize, Met)) {
     let mut crew = Crew {
         room,

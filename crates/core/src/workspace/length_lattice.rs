@@ -1,8 +1,9 @@
-//! The reachable workspace in joint space: the poses for a lattice of leg lengths, by continuation from one of them
-//! \[T41\].
+//! The reachable workspace in joint space: the poses for a lattice of leg lengths, by continuation from one
+//! of them \[T41\].
 //!
-//! Nodes are kept in slabs, one for each index of the first axis. In a wave each slab predicts where steps from its own
-//! newest poses lead, and then takes in those that lead to it: slabs share the threads, and wait for nothing else.
+//! Nodes are kept in slabs, one for each index of the first axis. In a wave each slab predicts where steps
+//! from its own newest poses lead, and then takes in those that lead to it: slabs share the threads, and wait
+//! for nothing else.
 
 use rayon::prelude::*;
 
@@ -13,13 +14,11 @@ use crate::model::mechanism::Mechanism;
 use crate::model::status::Status;
 use crate::number::lanes::WIDTH;
 use crate::spatial::{Pose, Vec3};
+use crate::workspace::lattice_poses::{Front, NONE, Reached, Slab};
 use crate::workspace::lattice_steps::{AXES, Met, Predicted, Room, Way, follow, marker, predict};
 
 /// Two poses with the same lengths and a marker this near are one, relative to the characteristic length.
 const SAME: f64 = 1e-4;
-
-/// End of a list of poses.
-const NONE: u32 = u32::MAX;
 
 /// Lengths of one actuated leg.
 #[derive(Clone, Copy, Debug)]
@@ -44,35 +43,6 @@ impl Axis {
     }
 }
 
-/// A pose that has been reached, by its marker: a point of the platform tells poses with the same lengths apart.
-#[derive(Clone, Copy, Debug)]
-struct Known {
-    marker: [f32; 3],
-    /// The pose of the same node that was reached before.
-    next: u32,
-}
-
-/// The nodes with one length of the first leg, and the poses reached there.
-#[derive(Clone, Debug)]
-struct Slab {
-    /// Index of its first node.
-    first: usize,
-    /// The pose of each node that was reached last.
-    last: Vec<u32>,
-    known: Vec<Known>,
-    /// Nodes that a step is under way to.
-    awaited: Vec<bool>,
-}
-
-/// Poses that a wave has reached in a slab, in the order of their nodes.
-#[derive(Clone, Debug, Default)]
-struct Front {
-    nodes: Vec<usize>,
-    poses: Vec<Pose<f64>>,
-    /// Directions, as bits, from which steps have led to the pose: the ways back are known.
-    came: Vec<u16>,
-}
-
 /// A step to a neighbour: along an axis by one node, back (even) or on (odd).
 #[derive(Clone, Copy, Debug)]
 struct Step {
@@ -88,8 +58,9 @@ struct Step {
 /// Steps to the slab before, to the same one, and to the slab behind.
 type Steps = [Vec<Step>; 3];
 
-/// The poses at the nodes of the lattice, reached wave by wave. A node may have several: those of one aspect with the
-/// same lengths. Memory: 5 bytes for each node and 16 for each pose, and 500 for each that a wave reaches.
+/// The poses at the nodes of the lattice, reached wave by wave. A node may have several: those of one aspect
+/// with the same lengths. Memory: 5 bytes for each node and 16 for each pose, and 500 for each that a wave
+/// reaches.
 #[derive(Clone, Debug)]
 pub struct Lattice {
     axes: Vec<Axis>,
@@ -101,117 +72,6 @@ pub struct Lattice {
     bounds: [[f64; 2]; 3],
     /// Lower end of the first layer of z and the height of each, m.
     pub layers: (f64, f64),
-}
-
-/// Poses reached by the search: inside all limits, each by a step from a neighbouring node.
-#[derive(Clone, Debug)]
-pub struct Reached {
-    /// Nodes with such a pose.
-    pub inside: u64,
-    /// The poses.
-    pub poses: u64,
-    /// Steps to a neighbour that end at a limit other than a stroke, or at the bounds.
-    pub at_limits: u64,
-    /// Steps to a neighbour that end in a singularity.
-    pub singular: u64,
-    /// Least and greatest coordinate of o, m: of these poses and of those passed on steps that are made in pieces.
-    pub extents: [[f64; 2]; 3],
-    /// Least and greatest x and y of o in each layer of z.
-    pub profile: Vec<[f64; 4]>,
-}
-
-impl Reached {
-    fn new(layers: usize) -> Self {
-        let none = [f64::INFINITY, f64::NEG_INFINITY];
-        let profile = vec![[none[0], none[1], none[0], none[1]]; layers];
-        Reached { inside: 0, poses: 0, at_limits: 0, singular: 0, extents: [none; 3], profile }
-    }
-
-    /// Takes a position of o into the extents.
-    fn record(&mut self, o: Vec3<f64>, layers: (f64, f64)) {
-        let o = o.array();
-        widen(self.extents.as_flattened_mut(), &[o[0], o[0], o[1], o[1], o[2], o[2]]);
-        // What is below the first layer counts to it.
-        let layer = ((o[2] - layers.0) / layers.1) as usize;
-        if let Some(p) = self.profile.get_mut(layer) {
-            widen(p, &[o[0], o[0], o[1], o[1]]);
-        }
-    }
-
-    /// Adds what another part of the lattice has met.
-    fn add(&mut self, other: &Self) {
-        self.inside += other.inside;
-        self.poses += other.poses;
-        self.at_limits += other.at_limits;
-        self.singular += other.singular;
-        widen(self.extents.as_flattened_mut(), other.extents.as_flattened());
-        widen(self.profile.as_flattened_mut(), other.profile.as_flattened());
-    }
-}
-
-/// Widens ranges, each a least and a greatest number, to hold others.
-fn widen(ranges: &mut [f64], others: &[f64]) {
-    for (range, other) in ranges.chunks_exact_mut(2).zip(others.chunks_exact(2)) {
-        if other[0] < range[0] {
-            range[0] = other[0];
-        }
-        if other[1] > range[1] {
-            range[1] = other[1];
-        }
-    }
-}
-
-impl Slab {
-    fn new(first: usize, nodes: usize) -> Self {
-        Slab { first, last: vec![NONE; nodes], known: vec![], awaited: vec![false; nodes] }
-    }
-
-    /// The last of the poses known at a node whose marker is within a distance of a point.
-    fn find(&self, node: usize, place: [f32; 3], within: f32) -> Option<usize> {
-        let mut at = self.last[node - self.first];
-        while let Some(known) = self.known.get(at as usize) {
-            let [x, y, z] = std::array::from_fn(|k| known.marker[k] - place[k]);
-            // An infinite distance is none.
-            if x * x + y * y + z * z < within * within {
-                return Some(at as usize);
-            }
-            at = known.next;
-        }
-        None
-    }
-
-    /// Keeps a new pose of a node.
-    fn keep(&mut self, node: usize, marker: [f32; 3]) {
-        let last = &mut self.last[node - self.first];
-        self.known.push(Known { marker, next: *last });
-        *last = u32::try_from(self.known.len() - 1).expect("fewer poses than memory holds");
-    }
-}
-
-impl Front {
-    fn push(&mut self, node: usize, pose: Pose<f64>, came: u16) {
-        self.nodes.push(node);
-        self.poses.push(pose);
-        self.came.push(came);
-    }
-
-    /// Notes the direction from which a step has led to one of the poses, if it has.
-    fn note(&mut self, pose: Option<usize>, direction: u16) {
-        if let Some(i) = pose {
-            self.came[i] |= direction;
-        }
-    }
-
-    /// Copy with the poses in the order of their nodes.
-    fn in_order(&self) -> Self {
-        let mut order: Vec<usize> = (0..self.nodes.len()).collect();
-        order.sort_by_key(|&i| self.nodes[i]);
-        Front {
-            nodes: order.iter().map(|&i| self.nodes[i]).collect(),
-            poses: order.iter().map(|&i| self.poses[i]).collect(),
-            came: order.iter().map(|&i| self.came[i]).collect(),
-        }
-    }
 }
 
 impl Step {
@@ -226,9 +86,9 @@ fn short(place: Vec3<f64>) -> [f32; 3] {
 }
 
 impl Lattice {
-    /// Lengths from the least to the greatest of each stroke in steps of about `step`, and layers of z of the height
-    /// `layer`; o within `bounds`. None where an actuated leg has no stroke or is no telescopic one, or the node next to the start pose has no pose inside all
-    /// limits in its mode.
+    /// Lengths from the least to the greatest of each stroke in steps of about `step`, and layers of z of the
+    /// height `layer`; o within `bounds`. None where an actuated leg has no stroke or is no telescopic one,
+    /// or the node next to the start pose has no pose inside all limits in its mode.
     #[must_use]
     pub fn new(
         mech: &Mechanism,
@@ -308,8 +168,9 @@ impl Lattice {
         squares
     }
 
-    /// Steps from the poses of the last wave to the neighbours of their nodes; the number of new poses. Those at one node
-    /// are found in the order of the poses that they are reached from: the number of threads changes nothing.
+    /// Steps from the poses of the last wave to the neighbours of their nodes; the number of new poses. Those
+    /// at one node are found in the order of the poses that they are reached from: the number of threads
+    /// changes nothing.
     pub fn wave(&mut self, mech: &Mechanism) -> usize {
         let steps: Vec<Steps> = self.fronts.par_iter().map(|front| self.steps(mech, front)).collect();
         let mut slabs = std::mem::take(&mut self.slabs);
@@ -372,8 +233,8 @@ impl Lattice {
         steps
     }
 
-    /// Makes the steps to a slab that lead to no pose known there. Where several lead to one node, the first of them is
-    /// made, and the others wait for what it finds.
+    /// Makes the steps to a slab that lead to no pose known there. Where several lead to one node, the first
+    /// of them is made, and the others wait for what it finds.
     fn receive(
         &self,
         mech: &Mechanism,
@@ -453,7 +314,8 @@ mod tests {
 
     const BOUNDS: [[f64; 2]; 3] = [[-0.8, 0.8], [-0.8, 0.8], [0.5, 1.0]];
 
-    /// The published manipulator; with a cone and a floor of the conditioning as well, the latter tested pose by pose.
+    /// The published manipulator; with a cone and a floor of the conditioning as well, the latter tested pose
+    /// by pose.
     fn mechanisms() -> [Mechanism; 2] {
         let mut limited = published();
         let limit = |measure, bound| Limit { name: String::new(), measure, bound, scale: 1.0 };

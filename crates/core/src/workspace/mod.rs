@@ -1,4 +1,5 @@
 pub mod fit_orientation;
 pub mod flood_fill;
+pub mod lattice_poses;
 pub mod lattice_steps;
 pub mod length_lattice;

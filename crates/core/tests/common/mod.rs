@@ -3,7 +3,8 @@
 #![allow(dead_code)] // each test file uses its share
 
 use polypod_core::assembly::build::assemble;
-use polypod_core::kinematics::coordinate_sets::{self, MAX_COORDINATES, Set};
+use polypod_core::kinematics::coordinate_sets::{MAX_COORDINATES, Set};
+use polypod_core::kinematics::dependent_coordinates;
 use polypod_core::kinematics::leg;
 use polypod_core::mobility::degrees_of_freedom;
 use polypod_core::model::mechanism::Mechanism;
@@ -42,8 +43,8 @@ pub fn every_leg() -> Vec<String> {
 /// Every pair of joints that a slider can have.
 pub const SLIDERS: [&str; 6] = ["PSS", "PUS", "PSU", "PUU", "PRS", "PRU"];
 
-/// Every leg of the catalogue, rods with one to three legs, one slider of each kind, six of them, and the published
-/// manipulator.
+/// Every leg of the catalogue, rods with one to three legs, one slider of each kind, six of them, and the
+/// published manipulator.
 pub fn mechanisms() -> Vec<Mechanism> {
     every_leg()
         .iter()
@@ -102,7 +103,8 @@ fn joints_of(letters: &str) -> [&str; 2] {
     if letters.starts_with('P') { [&letters[1..2], &letters[2..]] } else { [&letters[..1], &letters[2..]] }
 }
 
-/// A mechanism with one leg of the given letters, made up with UPS legs, with generic bodies, load and damping.
+/// A mechanism with one leg of the given letters, made up with UPS legs, with generic bodies, load and
+/// damping.
 pub fn with_leg(letters: &str, seed: u64) -> Mechanism {
     let freedoms = |l: &str| match l {
         "S" => 3,
@@ -152,7 +154,8 @@ pub fn pentapod(count: usize, body: &str, seed: u64) -> Mechanism {
     make(&spec.to_string())
 }
 
-/// Generic legs, bodies, load and damping; the last `on_rod` legs stand on a rod, the first `actuated` are driven.
+/// Generic legs, bodies, load and damping; the last `on_rod` legs stand on a rod, the first `actuated` are
+/// driven.
 fn generic(name: &str, letters: &[String], on_rod: usize, actuated: usize, seed: u64) -> Mechanism {
     make(&generic_spec(name, letters, on_rod, actuated, seed).to_string())
 }
@@ -260,8 +263,8 @@ fn make(spec: &str) -> Mechanism {
     assemble(&Spec::from_json(spec).expect("a readable spec")).expect("a sound mechanism")
 }
 
-/// States that keep the constraints: a pose near home and a motion through it, made with the coordinate set `pose`,
-/// whose independent coordinates are the first that determine the others.
+/// States that keep the constraints: a pose near home and a motion through it, made with the coordinate set
+/// `pose`, whose independent coordinates are the first that determine the others.
 pub fn states(mech: &Mechanism, count: usize, seed: u64) -> Vec<Motion<f64>> {
     let mut draw = Draw::new(seed);
     let mut result = Vec::new();
@@ -288,7 +291,7 @@ pub fn states(mech: &Mechanism, count: usize, seed: u64) -> Vec<Motion<f64>> {
                 let (d, dd) = if k < 6 { motion[k] } else { (0.0, 0.0) };
                 Jet::new(at[k], d, dd)
             });
-            let state = coordinate_sets::state(mech, &Set::Pose, &q, &given, 1.0, &pose);
+            let state = dependent_coordinates::state(mech, &Set::Pose, &q, &given, 1.0, &pose);
             let speed = state.platform.twist.v.norm() + state.platform.twist.omega.norm();
             if state.status == Status::Ok && speed < 20.0 {
                 result.push(state.platform);

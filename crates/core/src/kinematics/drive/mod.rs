@@ -1,7 +1,8 @@
 //! Drives at a pose and in motion: how each kind places the strut, moves its end, and carries forces.
 //!
-//! The one place where kinds are told apart. A new kind is a file beside those here, with its data and facts in
-//! [`model::drive`](crate::model::drive) and its part of a description in `model/spec.rs` and `assembly/drives.rs`.
+//! The one place where kinds are told apart. A new kind is a file beside those here, with its data and facts
+//! in [`model::drive`](crate::model::drive) and its part of a description in `model/spec.rs`,
+//! `model/spec_checks.rs` and `assembly/drives.rs`.
 
 mod slider;
 mod telescope;
@@ -24,8 +25,8 @@ macro_rules! ask {
 }
 
 impl<S> Drive<S> {
-    /// Where the leg is, from e and the r from B to b [Eq. 2, 3] \[T1\] \[T67\]. The coordinate is not a number where the strut
-    /// is too short.
+    /// Where the leg is, from e and the r from B to b [Eq. 2, 3] \[T1\] \[T67\]. The coordinate is not a
+    /// number where the strut is too short.
     #[inline(always)]
     pub fn position<T: Real>(&self, e: Vec3<T>, r: Vec3<T>) -> Position<T>
     where
@@ -43,7 +44,8 @@ impl<S> Drive<S> {
         ask!(self, foot(base, p))
     }
 
-    /// δ·d, d being the direction in which it moves the strut's end or foot: one of a telescopic leg, zero in a dead position.
+    /// δ·d, d being the direction in which it moves the strut's end or foot: one of a telescopic leg, zero in
+    /// a dead position.
     #[inline(always)]
     pub fn transmission<T: Real>(&self, p: &Position<T>) -> T
     where
@@ -70,8 +72,8 @@ impl<S> Drive<S> {
         ask!(self, hessian(p))
     }
 
-    /// How the coordinate and δ move with the platform end, whose velocity and acceleration are given in base axes
-    /// \[T3\] \[T4\] \[T68\].
+    /// How the coordinate and δ move with the platform end, whose velocity and acceleration are given in base
+    /// axes \[T3\] \[T4\] \[T68\].
     #[inline(always)]
     pub fn end<T: Real>(&self, p: &Position<T>, f: &Frame<T>, v_b: Vec3<T>, a_b: Vec3<T>) -> EndMotion<T>
     where
@@ -80,8 +82,8 @@ impl<S> Drive<S> {
         ask!(self, end(p, f, v_b, a_b))
     }
 
-    /// The part along δ of what a force at b and torques, both along n, δ, m, do to b: `across` are the parts along n and m
-    /// \[T14\] \[T69\].
+    /// The part along δ of what a force at b and torques, both along n, δ, m, do to b: `across` are the parts
+    /// along n and m \[T14\] \[T69\].
     #[inline(always)]
     pub fn carried_along<T: Real>(&self, f: &Frame<T>, force: Vec3<T>, across: [T; 2]) -> T
     where
@@ -141,20 +143,22 @@ impl<S> Drive<S> {
 
 /// The questions of joint reactions and of forward kinematics, of a mechanism that does not vary.
 impl Drive {
-    /// Point and axes of its joint in base axes, with d second: given B, the strut's foot and b, and the leg's axes \[T44\].
+    /// Point and axes of its joint in base axes, with d second: given B, the strut's foot and b, and the
+    /// leg's axes \[T44\].
     #[inline(always)]
     pub fn joint<T: Real>(&self, points: [Vec3<T>; 3], axes: &Mat3<T>) -> (Vec3<T>, Mat3<T>) {
         ask!(self, joint(points, axes))
     }
 
-    /// The number that the equations of forward kinematics vary with: the squared length, or the place of a carriage \[T25\].
+    /// The number that the equations of forward kinematics vary with: the squared length, or the place of a
+    /// carriage \[T25\].
     #[must_use]
     pub fn number(&self, coordinate: f64) -> f64 {
         ask!(self, number(coordinate))
     }
 
-    /// From that number: where the foot is, zero where it does not move, and the square of the distance from there to b
-    /// \[T25\] \[T69\].
+    /// From that number: where the foot is, zero where it does not move, and the square of the distance from
+    /// there to b \[T25\] \[T69\].
     #[inline(always)]
     pub fn asked<T: Real>(&self, number: T) -> (T, T) {
         ask!(self, asked(number))
@@ -172,7 +176,8 @@ impl Drive {
         ask!(self, asked_rate(r, place, square))
     }
 
-    /// Above zero where r from the foot leans to the side that belongs to the coordinate; one where there is but one side.
+    /// Above zero where r from the foot leans to the side that belongs to the coordinate; one where there is
+    /// but one side.
     #[inline(always)]
     pub fn leans<T: Real>(&self, r: Vec3<T>) -> T {
         ask!(self, leans(r))
@@ -185,8 +190,8 @@ impl Drive {
     }
 }
 
-/// The symmetric h with `(δ·d) q'' = δ·a_b + Vᵀ h V`, `Vᵀ h V = |P v_b|²/ℓ` and more with `P = 1 - along δᵀ`, where `along` is
-/// d/(δ·d).
+/// The symmetric h with `(δ·d) q'' = δ·a_b + Vᵀ h V`, `Vᵀ h V = |P v_b|²/ℓ` and more with `P = 1 - along δᵀ`,
+/// where `along` is d/(δ·d).
 #[inline(always)]
 fn swing<T: Real>(p: &Position<T>, along: Vec3<T>) -> Hessian<T> {
     let mut h = [[T::zero(); 6]; 6];

@@ -1,4 +1,4 @@
-//! A strut whose foot slides on a rail: the coordinate is the place of its carriage \[T67\]-\[T69\].
+//! A strut whose foot slides on a rail: the coordinate is the place of its carriage \[T67\] \[T68\] \[T69\].
 
 use super::swing;
 use crate::kinematics::leg_state::{EndMotion, Frame, LegRotation, LegState, PointMotion, Position};

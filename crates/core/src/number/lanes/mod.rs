@@ -1,8 +1,8 @@
 //! Several numbers side by side, one in each lane of a vector register.
 //!
-//! Every operation is that of the double, lane by lane; `mul_add` is fused where the processor has such an instruction
-//! ([`Lanes::FUSED`]). So results are the same bits on all registers that fuse, and on all that do not. [`dispatch`] picks
-//! the widest registers that the processor has when the program runs.
+//! Every operation is that of the double, lane by lane; `mul_add` is fused where the processor has such an
+//! instruction ([`Lanes::FUSED`]). So results are the same bits on all registers that fuse, and on all that
+//! do not. [`dispatch`] picks the widest registers that the processor has when the program runs.
 
 use std::mem::MaybeUninit;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -39,7 +39,8 @@ pub trait Lanes: Ordered {
 
     fn store(self, to: &mut [f64]);
 
-    /// From states one after the other, of which each has `N` numbers, to numbers of [`Lanes::WIDTH`] states side by side.
+    /// From states one after the other, of which each has `N` numbers, to numbers of [`Lanes::WIDTH`] states
+    /// side by side.
     #[inline(always)]
     fn gather<const N: usize>(states: &[f64]) -> [Self; N] {
         let (states, mut rows) = (&states[..N * Self::WIDTH], [[0.0; WIDTH]; N]);
@@ -55,7 +56,8 @@ pub trait Lanes: Ordered {
         numbers
     }
 
-    /// From rows of [`WIDTH`] states side by side to states one after the other, each with a number of every row.
+    /// From rows of [`WIDTH`] states side by side to states one after the other, each with a number of every
+    /// row.
     #[inline(always)]
     fn scatter(rows: &[Line], states: &mut [MaybeUninit<f64>]) {
         let states = &mut states[..rows.len() * WIDTH];
@@ -94,8 +96,9 @@ impl Lanes for f64 {
 
 /// Work to be compiled for registers of any width.
 ///
-/// The functions for one instruction set are methods of the task, because the compiler puts a method into the codegen unit of
-/// the type that has it: so the tasks of different modules, which are most of what there is to compile, compile side by side.
+/// The functions for one instruction set are methods of the task, because the compiler puts a method into the
+/// codegen unit of the type that has it: so the tasks of different modules, which are most of what there is
+/// to compile, compile side by side.
 pub trait Task: Sized {
     /// Must be `#[inline(always)]` with all that it calls, so that it is compiled for each instruction set.
     fn run<V: Lanes>(self);

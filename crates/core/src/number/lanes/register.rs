@@ -19,7 +19,8 @@ macro_rules! register {
         #[repr(transparent)]
         pub struct $name($vector);
 
-        // SAFETY of all blocks below: a value of this type exists only where `dispatch` has found the instructions.
+        // SAFETY of all blocks below: a value of this type exists only where `dispatch` has found the
+        // instructions.
         impl Add for $name {
             type Output = Self;
             #[inline(always)]
