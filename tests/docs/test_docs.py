@@ -179,7 +179,10 @@ def test_commands_exist(
 
 
 def anchors(page: Path) -> set[str]:
-    headings = re.findall(r"^#+ +(.+)$", prose(page), flags=re.MULTILINE)
+    """Those of the page and of what it includes."""
+    included = re.findall(r'{% include-markdown "([^"]+)"', prose(page))
+    texts = [prose(page), *(prose(page.parent / name) for name in included)]
+    headings = [h for text in texts for h in re.findall(r"^#+ +(.+)$", text, flags=re.MULTILINE)]
     plain = (re.sub(r"[^\w\- ]", "", heading).strip().lower() for heading in headings)
     return {re.sub(r"[\s-]+", "-", heading) for heading in plain}
 

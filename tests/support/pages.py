@@ -28,7 +28,8 @@ from polypod import cli
 from support import ROOT
 
 DOCS = ROOT / "docs"
-PAGES = [ROOT / "README.md", *sorted(DOCS.rglob("*.md"))]
+GLOSSARY = ROOT / "python/polypod/summary/glossary.md"
+PAGES = [ROOT / "README.md", GLOSSARY, *sorted(DOCS.rglob("*.md"))]
 DOCTEST_FLAGS = doctest.NORMALIZE_WHITESPACE | doctest.ELLIPSIS
 SHELLS = ("sh", "bash", "shell", "console")
 COLUMNS = "100"

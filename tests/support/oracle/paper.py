@@ -359,7 +359,8 @@ def eq44(r1, r3, c1, f_c, L=LU_L):
 def coupled_forces(e1, e3, r1, r3, l, f_c, L=LU_L):
     """f_c1, f_c3 along c1 = r1×L/|r1×L|, from statics alone: at b1 and b3 they are the wrench f_c (c, τ).
 
-    Six equations for two unknowns; that they hold is what Eq. 7, 8, 9, 10, 11 say. Returns the forces and the rest.
+    Six equations for two unknowns; that they hold is what Eq. 7, 8, 9, 10, 11 say.
+    Returns the forces and the rest.
     """
     c1 = np.cross(r1, L) / np.linalg.norm(np.cross(r1, L))
     A = np.array([np.concatenate([c1, np.cross(e, c1)]) for e in (e1, e3)]).T
