@@ -477,12 +477,11 @@ class Mechanism:
         return self._core.jacobian(poses)["jacobian"]
 
     def hessian(self, pose: ArrayLike) -> Array:
-        """(..., 6, 6, 6): H of `J A + Vᵀ H V = (ℓ'', 0)`, a symmetric layer for each row of J
-        [Eq. 15, 16, 17, 18, 19].
+        """(..., 6, 6, 6): H of `J A + Vᵀ H V = (ℓ'', 0)`, a layer for each row of J [Eq. 15, 16, 17, 18, 19].
 
-        Twist and acceleration at o in base axes; a leg's layer is in 1/m, 1 and m for (v, v), (v, ω) and
-        (ω, ω). For any pose (..., 4, 4), on the constraints or not. Local degrees of freedom have layers of
-        zeros; with redundant actuators H is (..., n_rows, 6, 6).
+        Layers are symmetric. Twist and acceleration at o in base axes; a leg's layer is in 1/m, 1 and m for
+        (v, v), (v, ω) and (ω, ω). For any pose (..., 4, 4), on the constraints or not. Local degrees of
+        freedom have layers of zeros; with redundant actuators H is (..., n_rows, 6, 6).
         """
         (poses,) = POSE(pose)
         return self._core.hessian(poses)["hessian"]
