@@ -498,7 +498,8 @@ def _vague(
         yield f"line {fault.line} says {line!r}"
     elif (number := re.match(rf"{top}\.(\d+)", fault.place)) and f"[[{top}]]" in lines and not texts:
         # The one table among those of its array; texts of several lines may hold what looks like one.
-        before = lines[: fault.line].count(f"[[{top}]]")
+        headers = [text.partition("#")[0].strip() for text in lines[: fault.line]]
+        before = headers.count(f"[[{top}]]")
         if before != int(number[1]):
             yield f"line {fault.line} is in {top}.{before}"
 
