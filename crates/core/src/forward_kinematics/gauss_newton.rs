@@ -266,21 +266,11 @@ pub fn forward_kinematics_of(mech: &Mechanism, states: &[Guessed]) -> Vec<FoundP
     for (k, (lengths, _)) in states.iter().enumerate() {
         put_numbers(mech, &mut numbers, k, lengths);
     }
-    let (mut poses, mut found) = ([[0.0; WIDTH]; 12], [Misses::default(); WIDTH]);
     // By reflections as long as rows are independent.
-    while mech.mobility.uncontrolled == 0 && searches.iter().any(|search| search.trial.is_some()) {
-        for (k, search) in searches.iter().enumerate() {
-            put(&mut poses, k, search.trial.as_ref().unwrap_or(&search.pose));
-        }
-        lanes::dispatch(Evaluation { mech, poses: &poses, numbers: &numbers, result: &mut found });
-        for (search, found) in searches.iter_mut().zip(found).filter(|(search, _)| search.trial.is_some()) {
-            if found.pivots > RANK_TOLERANCE {
-                search.judge(Some(found));
-            } else {
-                (search.dependent, search.trial) = (true, None);
-            }
-        }
+    if mech.mobility.uncontrolled == 0 {
+        lanes::dispatch(Iteration { mech, numbers: &numbers, searches: &mut searches });
     }
+    let mut poses = [[0.0; WIDTH]; 12];
     for (k, search) in searches.iter().enumerate() {
         put(&mut poses, k, &search.pose);
     }
@@ -304,36 +294,57 @@ fn by_singular_values(mech: &Mechanism, lengths: &[f64], guess: &Pose<f64>) -> F
     search.found(error(mech, &asked, &search.pose))
 }
 
-/// What poses side by side miss.
-struct Evaluation<'a> {
+/// Steps of states side by side, until all are done or their rows depend on one another.
+struct Iteration<'a, 'b> {
     mech: &'a Mechanism,
-    poses: &'a Poses,
-    /// Of each actuated leg, what varies.
     numbers: &'a [lanes::Row],
-    result: &'a mut [Misses<f64>; WIDTH],
+    searches: &'a mut [Search<'b>],
 }
 
-impl Task for Evaluation<'_> {
+impl Task for Iteration<'_, '_> {
     #[inline(always)]
     fn run<V: Lanes>(self) {
-        let Evaluation { mech, poses, numbers, result } = self;
+        let Iteration { mech, numbers, searches } = self;
         let (mut rows, mut errors) = (RedundantRows::<V>::new(mech), Errors::new(mech));
         let mut asked = vec![LegTarget::none(); numbers.len()];
-        for k in (0..WIDTH).step_by(V::WIDTH) {
-            let pose = load(poses, k);
-            set_targets(mech, numbers, k, &mut asked);
-            errors.set(mech, &asked, &pose);
-            let found = Misses::by_reflections(mech, &pose, &errors, &mut rows);
-            let numbers = [found.legs, found.others, found.merit, found.size, found.left, found.pivots];
-            let mut stored = [[0.0; WIDTH]; 12];
-            for i in 0..6 {
-                numbers[i].store(&mut stored[i]);
-                found.step[i].store(&mut stored[6 + i]);
+        let (mut poses, mut found) = ([[0.0; WIDTH]; 12], [Misses::default(); WIDTH]);
+        while searches.iter().any(|search| search.trial.is_some()) {
+            for (k, search) in searches.iter().enumerate() {
+                put(&mut poses, k, search.trial.as_ref().unwrap_or(&search.pose));
             }
-            for lane in 0..V::WIDTH {
-                let [legs, others, merit, size, left, pivots, step @ ..] = stored.map(|row| row[lane]);
-                result[k + lane] = Misses { legs, others, merit, step, size, left, pivots };
+            for k in (0..WIDTH).step_by(V::WIDTH) {
+                let pose = load(&poses, k);
+                set_targets(mech, numbers, k, &mut asked);
+                errors.set(mech, &asked, &pose);
+                put_misses(&Misses::by_reflections(mech, &pose, &errors, &mut rows), &mut found[k..]);
             }
+            for (search, found) in pairs(&mut *searches, &found) {
+                if search.trial.is_some() && found.pivots > RANK_TOLERANCE {
+                    search.judge(Some(*found));
+                } else if search.trial.is_some() {
+                    (search.dependent, search.trial) = (true, None);
+                }
+            }
+        }
+    }
+}
+
+/// From numbers side by side to those of each state.
+#[inline(always)]
+fn put_misses<V: Lanes>(misses: &Misses<V>, found: &mut [Misses<f64>]) {
+    let Misses { legs, others, merit, step, size, left, pivots } = misses;
+    let numbers = [legs, others, merit, size, left, pivots];
+    let mut stored = [[0.0; WIDTH]; 12];
+    for i in 0..6 {
+        numbers[i].store(&mut stored[i]);
+        step[i].store(&mut stored[6 + i]);
+    }
+    for lane in 0..V::WIDTH {
+        let found = &mut found[lane];
+        [found.legs, found.others, found.merit] = [stored[0][lane], stored[1][lane], stored[2][lane]];
+        [found.size, found.left, found.pivots] = [stored[3][lane], stored[4][lane], stored[5][lane]];
+        for i in 0..6 {
+            found.step[i] = stored[6 + i][lane];
         }
     }
 }
