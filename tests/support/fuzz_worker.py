@@ -72,6 +72,8 @@ def main(first: int, count: int, results: Path) -> None:
 if __name__ == "__main__":
     if len(sys.argv) == 2:
         case = mutated(int(sys.argv[1]))
-        print(case.source, *case.changes, case.content, judged(case, Path("mutated.toml")), sep="\n")
+        with tempfile.TemporaryDirectory() as folder:
+            outcome = judged(case, Path(folder) / "mutated.toml")
+        print(case.source, *case.changes, case.content, outcome, sep="\n")
     else:
         main(int(sys.argv[1]), int(sys.argv[2]), Path(sys.argv[3]))
