@@ -28,9 +28,7 @@ pub fn inverse_dynamics_derivatives<'py>(
 ) -> PyResult<(Vec<&'static str>, Bound<'py, PyDict>)> {
     let states = states(&poses, &twists, &accelerations)?;
     let loads = loads(wrenches.as_ref(), platform_axes, states.poses)?;
-    let (set, core) = (mech.set(set)?, mech.core());
-    let given = batch::searched_coordinates(core, &set, names.as_deref());
-    let varied = set.names().iter().zip(&given).filter(|(_, g)| **g).map(|(name, _)| *name).collect();
+    let ((set, given, varied), core) = (mech.searched(set, names.as_deref())?, mech.core());
     let table = py.detach(|| batch::inverse_dynamics_derivatives(core, &states, &loads, &set, &given));
     Ok((varied, arrays(py, table, &batch_of(&poses, 2))?))
 }

@@ -20,7 +20,7 @@ use pyo3::types::PyDict;
 
 use crate::arrays::{Array, arrays, arrays_but, batch_of, slice};
 use crate::faults::raise;
-use crate::states::{expect, loads, one_pose, states};
+use crate::states::{expect, guesses, loads, one_pose, states};
 
 type LimitRow = (String, &'static str, Vec<usize>, &'static str, f64, f64, f64);
 type JointRow = (String, &'static str, [String; 2]);
@@ -66,6 +66,18 @@ impl PyMechanism {
         } else {
             Err(PyValueError::new_err("lengths do not have one value for each leg"))
         }
+    }
+
+    /// A set, which of its numbers are given, and their names: those asked for, or as many as will do.
+    pub fn searched(
+        &self,
+        set: &str,
+        names: Option<&[String]>,
+    ) -> PyResult<(Set, Vec<bool>, Vec<&'static str>)> {
+        let set = self.set(set)?;
+        let given = batch::searched_coordinates(&self.0, &set, names);
+        let names = set.names().iter().zip(&given).filter(|(_, g)| **g).map(|(name, _)| *name).collect();
+        Ok((set, given, names))
     }
 
     pub fn set(&self, name: &str) -> PyResult<Set> {
@@ -152,10 +164,7 @@ impl PyMechanism {
                 }
             });
         }
-        let guess = guess.as_ref().map(slice).transpose()?;
-        if guess.is_some_and(|g| g.len() != 16 && g.len() != 16 * count) {
-            return Err(PyValueError::new_err("needs one guess, or one for each state"));
-        }
+        let guess = guesses(guess.as_ref(), count)?;
         let input = Coordinates { set, given: series, branch, guess, continued };
         let table = py.detach(|| batch::states(&self.0, &input, count));
         arrays(py, table, &batch)
@@ -260,9 +269,8 @@ impl PyMechanism {
         reach: f64,
     ) -> PyResult<(Vec<&'static str>, Bound<'py, PyDict>)> {
         let batch = batch_of(&poses, 2);
-        let (set, poses) = (self.set(set)?, slice(&poses)?);
-        let given = batch::searched_coordinates(&self.0, &set, names.as_deref());
-        let searched = set.names().iter().zip(&given).filter(|(_, g)| **g).map(|(name, _)| *name).collect();
+        let poses = slice(&poses)?;
+        let (set, given, searched) = self.searched(set, names.as_deref())?;
         let search = SingularitySearch { set, given, reach, scale: length };
         let table = py.detach(|| batch::nearest_singular(&self.0, poses, &search));
         Ok((searched, arrays(py, table, &batch)?))
@@ -340,9 +348,7 @@ impl PyMechanism {
         let (space, names) = match set {
             None => (Space::Platform, vec![]),
             Some(set) => {
-                let set = self.set(set)?;
-                let given = batch::searched_coordinates(&self.0, &set, names.as_deref());
-                let names = set.names().iter().zip(&given).filter(|(_, g)| **g).map(|(n, _)| *n).collect();
+                let (set, given, names) = self.searched(set, names.as_deref())?;
                 (Space::Coordinates(Box::new(set), given), names)
             }
         };
@@ -453,11 +459,8 @@ impl PyMechanism {
         continued: bool,
     ) -> PyResult<Bound<'py, PyDict>> {
         let batch = batch_of(&lengths, 1);
-        let (lengths, guess) = (self.lengths(&lengths)?, guess.as_ref().map(slice).transpose()?);
-        let count = lengths.len() / self.0.legs.len();
-        if guess.is_some_and(|g| g.len() != 16 && g.len() != 16 * count) {
-            return Err(PyValueError::new_err("needs one guess, or one for each state"));
-        }
+        let lengths = self.lengths(&lengths)?;
+        let guess = guesses(guess.as_ref(), lengths.len() / self.0.legs.len())?;
         let table = py.detach(|| batch::forward_kinematics(&self.0, lengths, guess, continued));
         arrays(py, table, &batch)
     }

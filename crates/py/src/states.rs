@@ -21,6 +21,15 @@ pub fn one_pose(poses: &Array<'_>) -> PyResult<Pose<f64>> {
     if matrix.len() == 16 { Ok(batch::pose_of(matrix)) } else { Err(PyValueError::new_err("not one pose")) }
 }
 
+/// No guess, one for all states, or one for each.
+pub fn guesses<'a>(poses: Option<&'a Array<'_>>, states: usize) -> PyResult<Option<&'a [f64]>> {
+    let poses = poses.map(slice).transpose()?;
+    if poses.is_some_and(|p| p.len() != 16 && p.len() != 16 * states) {
+        return Err(PyValueError::new_err("needs one guess, or one for each state"));
+    }
+    Ok(poses)
+}
+
 /// Without twists and accelerations all is at rest.
 pub fn states<'a>(
     poses: &'a Array<'_>,

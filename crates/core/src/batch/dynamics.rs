@@ -76,7 +76,11 @@ impl Working<3> for InverseDynamics<'_> {
     type Room<V: Lanes> = ForceSolver<V>;
 
     fn room<V: Lanes>(&self) -> ForceSolver<V> {
-        ForceSolver::new(self.mech)
+        let mut room = ForceSolver::new(self.mech);
+        if self.preferred.is_some() {
+            room.preferred = vec![V::zero(); self.mech.actuated().count()];
+        }
+        room
     }
 
     #[inline(always)]
@@ -97,7 +101,6 @@ impl Working<3> for InverseDynamics<'_> {
             .then(with_motion(mech, &platform, legs))
             .unless(finite(&load.array()), Status::InvalidInput);
         if let Some(preferred) = self.preferred {
-            room.preferred.resize(mech.actuated().count(), V::zero());
             read_actuated(mech, preferred, at, &mut room.preferred);
             codes = codes.unless(finite(&room.preferred), Status::InvalidInput);
         }
