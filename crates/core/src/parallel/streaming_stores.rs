@@ -41,11 +41,15 @@ mod x86 {
 
     #[inline(always)]
     pub(super) fn copy(numbers: &[MaybeUninit<f64>], places: &mut [MaybeUninit<f64>]) {
+        // Of the 64 bytes of a line each store writes 16.
         let (from, to) = (numbers.as_ptr().cast::<f64>(), places.as_mut_ptr().cast::<f64>());
-        for k in (0..numbers.len()).step_by(2) {
-            // SAFETY: both have so many numbers, all written, `to` begins a line, and every processor of this
-            // kind has the instructions.
-            unsafe { _mm_stream_pd(to.add(k), _mm_loadu_pd(from.add(k))) };
+        for line in 0..numbers.len() / 8 {
+            for k in [0, 2, 4, 6] {
+                let at = 8 * line + k;
+                // SAFETY: both have so many numbers, all written, `to` begins a line, and every processor of
+                // this kind has the instructions.
+                unsafe { _mm_stream_pd(to.add(at), _mm_loadu_pd(from.add(at))) };
+            }
         }
     }
 

@@ -60,11 +60,17 @@ pub trait Lanes: Ordered {
     /// row.
     #[inline(always)]
     fn scatter(rows: &[Line], states: &mut [MaybeUninit<f64>]) {
-        let states = &mut states[..rows.len() * WIDTH];
-        for lane in 0..WIDTH {
-            for k in 0..rows.len() {
-                states[lane * rows.len() + k].write(rows[k].0[lane]);
-            }
+        scatter_each(rows, states);
+    }
+}
+
+/// See [`Lanes::scatter`]: one number after the other.
+#[inline(always)]
+fn scatter_each(rows: &[Line], states: &mut [MaybeUninit<f64>]) {
+    let states = &mut states[..rows.len() * WIDTH];
+    for lane in 0..WIDTH {
+        for k in 0..rows.len() {
+            states[lane * rows.len() + k].write(rows[k].0[lane]);
         }
     }
 }
@@ -302,6 +308,9 @@ pub mod tests {
     #[test]
     fn states_are_turned_into_rows_and_back() {
         turns::<1>();
+        turns::<3>();
+        turns::<4>();
+        turns::<5>();
         turns::<6>();
         turns::<8>();
         turns::<15>();

@@ -7,7 +7,7 @@ use std::ops::{Add, Div, Mul, Neg, Sub};
 use std::mem::MaybeUninit;
 use std::sync::atomic::Ordering;
 
-use super::{Lanes, Line, Task, WIDEST};
+use super::{Lanes, Line, Task, WIDEST, scatter_each};
 use crate::number::real::Real;
 
 register! {
@@ -34,6 +34,72 @@ register! {
     greater |a, b| _mm256_cmp_pd::<_CMP_GT_OQ>(a, b);
     at_most |a, b| _mm256_cmp_pd::<_CMP_LE_OQ>(a, b);
     select |mask, a, b| _mm256_blendv_pd(b, a, mask);
+
+    #[inline(always)]
+    fn gather<const N: usize>(states: &[f64]) -> [Self; N] {
+        let (states, mut numbers) = (&states[..4 * N], [Self::lit(0.0); N]);
+        if N < 4 {
+            for k in 0..N {
+                numbers[k] = Self::load(&[states[k], states[N + k], states[2 * N + k], states[3 * N + k]]);
+            }
+            return numbers;
+        }
+        for tile in 0..N.div_ceil(4) {
+            // The last tile ends with the last number: it may hold some of the one before again.
+            let start = (4 * tile).min(N - 4);
+            let mut lanes = [Self::lit(0.0).0; 4];
+            for lane in 0..4 {
+                lanes[lane] = Self::load(&states[lane * N + start..]).0;
+            }
+            let columns = transposed_4(lanes);
+            for k in 0..4 {
+                numbers[start + k] = F64x4(columns[k]);
+            }
+        }
+        numbers
+    }
+
+    #[inline(always)]
+    fn scatter(rows: &[Line], states: &mut [MaybeUninit<f64>]) {
+        let count = rows.len();
+        if count < 4 {
+            return scatter_each(rows, states);
+        }
+        assert!(states.len() >= 8 * count);
+        for tile in 0..count.div_ceil(4) {
+            let start = (4 * tile).min(count - 4);
+            for first in [0, 4] {
+                let mut numbers = [Self::lit(0.0).0; 4];
+                for k in 0..4 {
+                    numbers[k] = Self::load(&rows[start + k].0[first..]).0;
+                }
+                let lanes = transposed_4(numbers);
+                for k in 0..4 {
+                    // SAFETY: start + 4 ≤ count: all four are numbers of this state.
+                    unsafe {
+                        let to = states.as_mut_ptr().add((first + k) * count + start);
+                        _mm256_storeu_pd(to.cast(), lanes[k]);
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// The rows of a 4×4 tile as its columns.
+#[inline(always)]
+fn transposed_4([a, b, c, d]: [__m256d; 4]) -> [__m256d; 4] {
+    // SAFETY: called where `dispatch` has found the instructions.
+    unsafe {
+        let (even, odd) = (_mm256_unpacklo_pd(a, b), _mm256_unpackhi_pd(a, b));
+        let (even2, odd2) = (_mm256_unpacklo_pd(c, d), _mm256_unpackhi_pd(c, d));
+        [
+            _mm256_permute2f128_pd::<0x20>(even, even2),
+            _mm256_permute2f128_pd::<0x20>(odd, odd2),
+            _mm256_permute2f128_pd::<0x31>(even, even2),
+            _mm256_permute2f128_pd::<0x31>(odd, odd2),
+        ]
+    }
 }
 
 register! {
@@ -59,7 +125,7 @@ register! {
                 // SAFETY: no number beyond those of the state is read.
                 tile[lane] = unsafe { _mm512_maskz_loadu_pd(mask, states.as_ptr().add(lane * N + start)) };
             }
-            let tile = transposed(tile);
+            let tile = transposed_8(tile);
             for k in start..N.min(start + 8) {
                 numbers[k] = F64x8(tile[k - start]);
             }
@@ -77,7 +143,7 @@ register! {
                 // The last row again beyond it: no branch, and never stored.
                 tile[k] = Self::load(&rows[(start + k).min(count - 1)].0).0;
             }
-            let (tile, mask) = (transposed(tile), first(count - start));
+            let (tile, mask) = (transposed_8(tile), first(count - start));
             for lane in 0..8 {
                 // SAFETY: no number beyond those of the state is written.
                 unsafe {
@@ -97,7 +163,7 @@ fn first(count: usize) -> __mmask8 {
 
 /// The rows of an 8×8 tile as its columns.
 #[inline(always)]
-fn transposed(rows: [__m512d; 8]) -> [__m512d; 8] {
+fn transposed_8(rows: [__m512d; 8]) -> [__m512d; 8] {
     let [a, b, c, d, e, f, g, h] = rows;
     // SAFETY: called where `dispatch` has found the instructions.
     unsafe {
