@@ -10,6 +10,7 @@ use crate::kinematics::rows::{Row, for_each_row};
 use crate::model::mechanism::{Leg, Mechanism};
 use crate::model::status::Status;
 use crate::number::real::{Ordered, Real};
+use crate::number::slices::pairs;
 use crate::numerics::gauss::solve;
 use crate::spatial::{Pose, Twist, Vec3, Wrench};
 
@@ -132,7 +133,7 @@ impl<T: Real> System<T> {
 #[must_use]
 pub fn numbers(mech: &Mechanism, coordinates: &[f64]) -> [f64; 6] {
     let mut numbers = [0.0; 6];
-    for ((number, (_, leg)), &q) in numbers.iter_mut().zip(mech.actuated()).zip(coordinates) {
+    for ((number, (_, leg)), &q) in pairs(pairs(&mut numbers, mech.actuated()), coordinates) {
         *number = leg.drive.number(q);
     }
     numbers
@@ -142,7 +143,7 @@ pub fn numbers(mech: &Mechanism, coordinates: &[f64]) -> [f64; 6] {
 #[must_use]
 pub fn asked(mech: &Mechanism, coordinates: &[f64]) -> [LegTarget<f64>; 6] {
     let mut asked = [LegTarget::none(); 6];
-    for (asked, of_leg) in asked.iter_mut().zip(asked_of_all(mech, coordinates)) {
+    for (asked, of_leg) in pairs(&mut asked, asked_of_all(mech, coordinates)) {
         *asked = of_leg;
     }
     asked
@@ -150,13 +151,13 @@ pub fn asked(mech: &Mechanism, coordinates: &[f64]) -> [LegTarget<f64>; 6] {
 
 /// Targets of the actuated legs, however many they are.
 pub fn asked_of_all(mech: &Mechanism, coordinates: &[f64]) -> impl Iterator<Item = LegTarget<f64>> {
-    mech.actuated().zip(coordinates).map(|((_, leg), &q)| LegTarget::of(leg, leg.drive.number(q)))
+    pairs(mech.actuated(), coordinates).map(|((_, leg), &q)| LegTarget::of(leg, leg.drive.number(q)))
 }
 
 /// Whether actuated legs can have these coordinates: numbers, and lengths none below zero.
 #[must_use]
 pub fn are_coordinates(mech: &Mechanism, coordinates: &[f64]) -> bool {
-    mech.actuated().zip(coordinates).all(|((_, leg), q)| *q >= leg.drive.kind().least && q.is_finite())
+    pairs(mech.actuated(), coordinates).all(|((_, leg), q)| *q >= leg.drive.kind().least && q.is_finite())
 }
 
 /// A solution (v/Λ, ω) of the system as a step of the pose.
@@ -179,9 +180,13 @@ struct NewtonStep {
 
 #[inline(always)]
 fn newton(mech: &Mechanism, pose: &Pose<f64>, asked: &[LegTarget<f64>; 6], to: &[f64; 6]) -> NewtonStep {
-    let System { residual, matrix } = system(mech, pose, asked);
-    let residual: [f64; 6] = std::array::from_fn(|i| residual[i] - to[i]);
-    let solved = solve(matrix, residual.map(|f| -f));
+    let System { mut residual, matrix } = system(mech, pose, asked);
+    let mut rhs = [0.0; 6];
+    for i in 0..6 {
+        residual[i] -= to[i];
+        rhs[i] = -residual[i];
+    }
+    let solved = solve(matrix, rhs);
     NewtonStep {
         step: solved.x,
         size: size(&solved.x),

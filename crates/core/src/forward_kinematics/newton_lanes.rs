@@ -9,6 +9,7 @@ use crate::forward_kinematics::newton::{
 use crate::model::mechanism::Mechanism;
 use crate::model::status::Status;
 use crate::number::lanes::{self, Lanes, Row, Task, WIDTH};
+use crate::number::slices::pairs;
 use crate::numerics::gauss::{Solved, solve};
 use crate::spatial::Pose;
 use crate::spatial::packed_poses::{Poses, get, load, put, store};
@@ -34,7 +35,7 @@ pub fn forward_kinematics_of(mech: &Mechanism, states: &[Guessed]) -> Vec<FoundP
         lanes::dispatch(Evaluation { mech, poses: &poses, numbers: &to, result: &mut at });
         for (k, lane) in lanes.iter_mut().enumerate().filter(|(_, lane)| lane.is_under_way()) {
             if lane.judge(&at, k) {
-                for (row, next) in poses.iter_mut().zip(&at.next) {
+                for (row, next) in pairs(&mut poses, &at.next) {
                     row[k] = next[k];
                 }
             }
@@ -235,7 +236,7 @@ pub(crate) fn newton<V: Lanes>(
 
 /// What varies of the legs of a state: see [`numbers`](crate::forward_kinematics::newton::numbers).
 pub(crate) fn put_numbers(mech: &Mechanism, rows: &mut [Row], k: usize, coordinates: &[f64]) {
-    for ((row, (_, leg)), &q) in rows.iter_mut().zip(mech.actuated()).zip(coordinates) {
+    for ((row, (_, leg)), &q) in pairs(pairs(rows, mech.actuated()), coordinates) {
         row[k] = leg.drive.number(q);
     }
 }
