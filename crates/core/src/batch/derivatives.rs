@@ -17,9 +17,11 @@ use crate::kinematics::rows::RowNumbers;
 use crate::model::mechanism::Mechanism;
 use crate::model::status::Status;
 use crate::number::lanes::Lanes;
+use crate::number::real::Dual;
 use crate::number::slices;
 use crate::number::work::work;
 use crate::spatial::{Motion, Wrench};
+use std::ops::Range;
 
 /// A field for the forces of all legs and one for the multipliers.
 type Pair = [FieldId; 2];
@@ -72,6 +74,7 @@ pub fn inverse_dynamics_derivatives(
         varied: varied.collect::<Option<Vec<_>>>(),
         parameters: geometry.len(),
         regressor: Regressor::new(mech),
+        rows: ColumnRows::of(mech),
     };
     block::table(&operation, states.len(), fields)
 }
@@ -90,13 +93,16 @@ struct Derivatives<'a> {
     varied: Option<Vec<Varied>>,
     parameters: usize,
     regressor: Regressor,
+    rows: ColumnRows,
 }
 
-/// Forces and their response at a block of states, columns of derivatives, and the legs' states and lengths.
+/// Forces and their response at a block of states, columns of derivatives, and the legs' states, places and
+/// lengths.
 struct Room<V> {
     response: UnitForceResponse<V>,
     forces: Vec<V>,
     legs: Vec<leg::LegState<V>>,
+    places: Vec<leg::LegPlacement<Dual<V>>>,
     by_motion: Vec<V>,
     by_bodies: Vec<V>,
     column: Vec<V>,
@@ -112,6 +118,7 @@ impl<V: Lanes> Room<V> {
             response: UnitForceResponse::new(mech),
             forces: zeros(rows),
             legs: Vec::with_capacity(mech.legs.len()),
+            places: Vec::with_capacity(mech.legs.len()),
             by_motion: zeros(DIRECTIONS * rows),
             by_bodies: zeros(parameters * rows),
             column: zeros(rows),
@@ -131,11 +138,11 @@ impl Working<17> for Derivatives<'_> {
     #[inline(always)]
     fn run<V: Lanes>(&self, room: &mut Room<V>, at: At, answers: &mut Answers<'_, 17>) -> Codes<V> {
         let (mech, ids) = (self.mech, Answers::<17>::fields());
-        let Room { response, forces, legs, by_motion, by_bodies, column, off, lengths } = room;
+        let Room { response, forces, legs, places, by_motion, by_bodies, column, off, lengths } = room;
         let (state, codes) = solve(mech, self.states, self.loads, at, response, forces);
-        V::apart(ByMotion { mech, at: &state, off, columns: by_motion });
+        V::apart(ByMotion { mech, at: &state, off, places, columns: by_motion });
         for (k, column) in by_motion.chunks_exact(state.forces.len()).enumerate() {
-            put(mech, answers, pair(&ids, k / 6), 6, k % 6, column);
+            self.rows.put(answers, pair(&ids, k / 6), 6, k % 6, column);
         }
         self.put_by_bodies(&state, legs, by_bodies, column, pair(&ids, 6), answers);
 
@@ -147,7 +154,7 @@ impl Working<17> for Derivatives<'_> {
             for order in 0..3 {
                 by.put_derivative(by_motion, &varied, order, column);
                 sum = add(sum, column);
-                put(mech, answers, pair(&ids, 3 + order), self.numbers.len(), k, column);
+                self.rows.put(answers, pair(&ids, 3 + order), self.numbers.len(), k, column);
             }
         }
         let codes = keep(answers, &ids[6..12], determined, sum, codes);
@@ -162,7 +169,7 @@ impl Working<17> for Derivatives<'_> {
                 None => slices::fill(column, V::lit(f64::NAN)),
             }
             sum = add(add(sum, column), lengths);
-            put(mech, answers, pair(&ids, 7), self.parameters, k, column);
+            self.rows.put(answers, pair(&ids, 7), self.parameters, k, column);
             for leg in 0..mech.legs.len() {
                 answers.put(ids[16], leg * self.parameters + k, [lengths[leg]]);
             }
@@ -207,7 +214,7 @@ impl Derivatives<'_> {
         }
         for k in 0..count {
             self.regressor.put_by_bodies(columns, k, column);
-            put(mech, answers, fields, count, k, column);
+            self.rows.put(answers, fields, count, k, column);
         }
     }
 }
@@ -237,7 +244,8 @@ pub fn regressors(mech: &Mechanism, states: &States, loads: &Loads) -> Table {
         ("forces_offset", vec![forces]),
         ("constraint_offset", vec![multipliers]),
     ];
-    let operation = Regressors { mech, states, loads, regressor: Regressor::new(mech) };
+    let (regressor, rows) = (Regressor::new(mech), ColumnRows::of(mech));
+    let operation = Regressors { mech, states, loads, regressor, rows };
     block::table(&operation, states.len(), fields)
 }
 
@@ -246,6 +254,7 @@ struct Regressors<'a> {
     states: &'a States<'a>,
     loads: &'a Loads<'a>,
     regressor: Regressor,
+    rows: ColumnRows,
 }
 
 impl Working<4> for Regressors<'_> {
@@ -264,11 +273,11 @@ impl Working<4> for Regressors<'_> {
         let (platform, width) = (&state.platform, self.regressor.parameters.len());
         for k in 0..width {
             V::apart(UnitColumn { regressor: &self.regressor, mech, state: &state, legs, k, column });
-            put(mech, answers, [y, y_constraint], width, k, column);
+            self.rows.put(answers, [y, y_constraint], width, k, column);
         }
         let load = self.loads.of(mech, &platform.pose, at);
         state.response.put(Regressor::rest(mech, &platform.twist, load), &[], column);
-        put(mech, answers, [offset, offset_constraint], 1, 0, column);
+        self.rows.put(answers, [offset, offset_constraint], 1, 0, column);
         within_limits(mech, &platform.pose, codes)
     }
 }
@@ -329,24 +338,39 @@ work! {
     }
 }
 
-/// One of `width` columns for active forces and multipliers, of rows for all legs (zero for passive ones) and
-/// multipliers.
-#[inline(always)]
-fn put<V: Lanes, const N: usize>(
-    mech: &Mechanism,
-    answers: &mut Answers<'_, N>,
-    [forces, multipliers]: Pair,
-    width: usize,
-    k: usize,
-    column: &[V],
-) {
-    let numbers = RowNumbers::of(mech);
-    let mut row = 0;
-    for (i, leg) in mech.legs.iter().enumerate() {
-        answers.put(forces, i * width + k, [if leg.actuated { column[row] } else { V::zero() }]);
-        row += usize::from(leg.actuated);
+/// Where a column of active forces and multipliers goes: the row of J of each leg, none of a passive one, and the
+/// rows of the constraints.
+struct ColumnRows {
+    legs: Vec<Option<usize>>,
+    constraints: Range<usize>,
+}
+
+impl ColumnRows {
+    fn of(mech: &Mechanism) -> Self {
+        let mut rows = 0..;
+        let legs = mech.legs.iter().map(|leg| if leg.actuated { rows.next() } else { None });
+        ColumnRows { legs: legs.collect(), constraints: RowNumbers::of(mech).constraints() }
     }
-    for (i, x) in column[numbers.constraints()].iter().enumerate() {
-        answers.put(multipliers, i * width + k, [*x]);
+
+    /// Puts the k-th of `width` columns: forces of all legs, zero of passive ones, and multipliers.
+    #[inline(always)]
+    fn put<V: Lanes, const N: usize>(
+        &self,
+        answers: &mut Answers<'_, N>,
+        [forces, multipliers]: Pair,
+        width: usize,
+        k: usize,
+        column: &[V],
+    ) {
+        let mut part = k;
+        for row in &self.legs {
+            answers.put(forces, part, [row.map_or_else(V::zero, |row| column[row])]);
+            part += width;
+        }
+        let mut part = k;
+        for x in &column[self.constraints.clone()] {
+            answers.put(multipliers, part, [*x]);
+            part += width;
+        }
     }
 }

@@ -23,6 +23,9 @@ use crate::spatial::{Acceleration, Motion, Pose, Twist, Vec3, Wrench};
 /// base through o), six of the twist, six of the acceleration.
 pub const DIRECTIONS: usize = 18;
 
+/// The first of them, the only ones that J's rows and the legs' places vary in.
+const POSE_DIRECTIONS: usize = 6;
+
 /// Inverse dynamics at a state, solved. Forces and multipliers, or how they change, stand in the order of J's
 /// rows.
 #[derive(Clone, Copy)]
@@ -55,25 +58,24 @@ impl<'a, 'b, V: Lanes> Imbalance<'a, 'b, V> {
         Imbalance { at, wrench, motion, rows }
     }
 
-    /// Adds a leg's own wrench and that of its kept active force; `row` counts the legs that have one.
+    /// Adds a leg's own wrench and that of its kept active force, where J's row of this number varies.
     #[inline(always)]
     fn add_leg<S: Constant<Dual<V>>>(
         &mut self,
         mech: &Mechanism<S>,
         index: usize,
+        place: &leg::LegPlacement<Dual<V>>,
         varied: &Motion<Dual<V>>,
-        row: &mut usize,
+        row: Option<usize>,
     ) {
         let leg = &mech.legs[index];
-        let place = leg::place(leg, &varied.pose);
-        let mut sum = leg_wrench(mech, index, leg, &place, varied);
-        if leg.actuated {
+        let mut sum = leg_wrench(mech, index, leg, place, varied);
+        if let Some(row) = row {
             let unit = leg::row(leg, &place.0);
-            sum = sum + unit * Dual::new(self.at.forces[*row], V::zero());
-            if let Some(off) = self.rows.get_mut(*row) {
+            sum = sum + unit * Dual::new(self.at.forces[row], V::zero());
+            if let Some(off) = self.rows.get_mut(row) {
                 *off = unit.power(&self.motion).d;
             }
-            *row += 1;
         }
         self.wrench = self.wrench + sum;
     }
@@ -103,9 +105,15 @@ work! {
         mech: &'a Mechanism,
         at: &'a SolvedDynamics<'b, V>,
         off: &'a mut [V],
+        places: &'a mut Vec<leg::LegPlacement<Dual<V>>>,
         columns: &'a mut [V],
     } -> () {
         let width = mech.rows();
+        let still = along(&at.platform, &[V::zero(); DIRECTIONS]);
+        places.clear();
+        for leg in &mech.legs {
+            places.push(leg::place(leg, &still.pose));
+        }
         for direction in 0..DIRECTIONS {
             let mut step = [V::zero(); DIRECTIONS];
             step[direction] = V::one();
@@ -114,13 +122,17 @@ work! {
             let load = Wrench::new(load.force.with_rate(Vec3::zero()), load.torque.with_rate(Vec3::zero()));
             let own = own_wrench(mech, &varied, load_in_base(load, axes, &varied.pose));
             let mut imbalance = Imbalance::new(at, own, off);
-            let mut row = 0;
-            for i in 0..mech.legs.len() {
-                imbalance.add_leg(mech, i, &varied, &mut row);
+            let (pose_varies, mut row) = (direction < POSE_DIRECTIONS, 0);
+            for (i, leg) in mech.legs.iter().enumerate() {
+                let place = if pose_varies { leg::place(leg, &varied.pose) } else { places[i] };
+                imbalance.add_leg(mech, i, &place, &varied, (pose_varies && leg.actuated).then_some(row));
+                row += usize::from(leg.actuated);
             }
-            for_each_row!(others of mech, at.numbers.actuated().end, |number, other| {
-                imbalance.add_row(other, number, &varied.pose);
-            });
+            if pose_varies {
+                for_each_row!(others of mech, at.numbers.actuated().end, |number, other| {
+                    imbalance.add_row(other, number, &varied.pose);
+                });
+            }
             imbalance.put(&mut columns[direction * width..(direction + 1) * width]);
         }
     }
@@ -349,11 +361,13 @@ work! {
         let still = along(&at.platform, &[V::zero(); DIRECTIONS]);
         let mut imbalance = Imbalance::new(at, Wrench::zero(), off);
         for &i in legs {
+            let leg = &mech.legs[i];
             let mut row = 0;
-            for other in 0..i {
-                row += usize::from(mech.legs[other].actuated);
+            for other in &mech.legs[..i] {
+                row += usize::from(other.actuated);
             }
-            imbalance.add_leg(mech, i, &still, &mut row);
+            let place = leg::place(leg, &still.pose);
+            imbalance.add_leg(mech, i, &place, &still, leg.actuated.then_some(row));
         }
         for (idle, number) in pairs(&mech.idle, at.numbers.idle()) {
             imbalance.add_row(Row::Idle(idle), number, &still.pose);
@@ -370,7 +384,8 @@ work! {
         }
         let moving = along(&at.platform, &step);
         for (i, leg) in mech.legs.iter().enumerate() {
-            lengths[i] = leg::position(leg, &moving.pose).coordinate.d;
+            let varies = *moves || legs.contains(&i);
+            lengths[i] = if varies { leg::position(leg, &moving.pose).coordinate.d } else { V::zero() };
         }
     }
 }
