@@ -304,6 +304,14 @@ class Mechanism:
                 f"redundant actuators: {driven} for {self.dof - len(mobility.idle)} degrees of freedom. "
                 "Their forces are a choice, and only lengths that agree have a pose."
             )
+            held = [
+                leg for leg, letters in zip(self.leg_names, self.leg_letters, strict=True) if letters == "UPU"
+            ]
+            if held:
+                notes[-1] += (
+                    f" Legs with U joints at both ends ({', '.join(held)}) do not rotate about their own "
+                    "lines; where they should, they have a spherical joint at one end: UPS or SPU."
+                )
         notes += [f"local degree of freedom: {idle}; nothing drives or holds it." for idle in mobility.idle]
         if mobility.passive:
             notes.append(
@@ -635,7 +643,7 @@ class Mechanism:
             pose: (..., 4, 4).
             set: the coordinate set; `natural` by default, or `pose` for a mechanism without it.
             coordinates: of the set `pose`, the `dof` coordinates to give; by default those that determine the
-                others best at the centre pose.
+                others best at generic poses near the centre pose.
             length: what rotations are counted with, m; `characteristic_length` by default.
             reach: how far lengths are followed, m; by default the longest leg at the centre pose. Angles are
                 followed for a full turn.
@@ -891,7 +899,7 @@ class Mechanism:
             twist: (..., 6).
             coordinates: None for platform space; or a coordinate set of independent coordinates; or the
                 names of `dof` coordinates of one. Of the set `pose` without names those are taken that
-                determine the others best at the centre pose.
+                determine the others best at generic poses near the centre pose.
 
         The status is FOLD where the coordinates do not determine rates.
 
@@ -959,7 +967,7 @@ class Mechanism:
             wrench_axes: the axes of `wrench`, "base" or "platform".
             set: the coordinate set; `natural` by default, or `pose` for a mechanism without it.
             coordinates: of the set `pose`, the `dof` coordinates to vary; by default those that determine the
-                others best at the centre pose.
+                others best at generic poses near the centre pose.
 
         Raises:
             CoordinateError: coordinates that make up no set of this mechanism.

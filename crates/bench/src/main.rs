@@ -20,6 +20,7 @@ use polypod_core::kinematics::jacobian::jacobian;
 use polypod_core::kinematics::leg;
 use polypod_core::model::mechanism::Mechanism;
 use polypod_core::number::lanes::{Lanes, Task, dispatch};
+use polypod_core::number::order::larger;
 use polypod_core::number::real::{Ordered, Real, Trig};
 use polypod_core::numerics::gauss::solve;
 use polypod_core::spatial::{Acceleration, Motion, Pose, Twist, Vec3, Wrench};
@@ -200,7 +201,7 @@ fn main() {
         let mut now = Rates::default();
         dispatch(Peak(&mut now));
         for k in 0..peaks.len() {
-            peaks[k] = peaks[k].max(now[k]);
+            peaks[k] = larger(peaks[k], now[k]);
         }
     }
     let result = json!({

@@ -12,7 +12,7 @@ use common::{published, states};
 use polypod_core::batch::{self, Coordinates, Loads, States, Table};
 use polypod_core::dynamics::inverse_dynamics;
 use polypod_core::kinematics::coordinate_sets::Set;
-use polypod_core::kinematics::dependent_coordinates;
+use polypod_core::mobility::independent_coordinates;
 use polypod_core::model::mechanism::Mechanism;
 use polypod_core::parallel::threads;
 use polypod_core::spatial::Motion;
@@ -80,7 +80,7 @@ const OPERATIONS: [(&str, Operation); 17] = [
     ("joint reactions", |mech, a| batch::joint_reactions(mech, &a.states(), &Loads::Own, 1.0)),
     ("derivatives", |mech, a| {
         let set = Set::of(mech)[0];
-        let given = dependent_coordinates::best_given(mech, &set);
+        let given = independent_coordinates::best_given(mech, &set);
         batch::inverse_dynamics_derivatives(mech, &a.states(), &Loads::Own, &set, &given)
     }),
     ("regressor", |mech, a| batch::regressors(mech, &a.states(), &Loads::Own)),

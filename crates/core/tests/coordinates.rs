@@ -6,9 +6,10 @@ mod common;
 use common::{mechanisms, states};
 use polypod_core::batch::{self, Coordinates};
 use polypod_core::kinematics::coordinate_sets::{self, Set};
-use polypod_core::kinematics::dependent_coordinates;
+use polypod_core::mobility::independent_coordinates;
 use polypod_core::model::mechanism::Mechanism;
 use polypod_core::model::status::Status;
+use polypod_core::number::order::larger;
 
 /// Relative to one, or to the number.
 const ROUNDING: f64 = 1e-8;
@@ -43,7 +44,7 @@ fn states_of_many_coordinates_are_those_of_each() {
         for set in Set::of(&mech) {
             let all = series(&mech, &set, count);
             // The least that must be given, and all that may be: γ of the paper's set is never.
-            let least = dependent_coordinates::best_given(&mech, &set);
+            let least = independent_coordinates::best_given(&mech, &set);
             let most = vec![true; all.len()];
             for given in if matches!(set, Set::Paper(_)) { vec![least] } else { vec![least, most] } {
                 for branch in [1.0, -1.0] {
@@ -70,7 +71,7 @@ fn states_of_many_coordinates_are_those_of_each() {
                                 assert!(x.to_bits() == y.to_bits() || (x.is_nan() && y.is_nan()), "{place}");
                             }
                             for (x, y) in row.iter().zip(&alone.fields[k].data) {
-                                let near = (x - y).abs() <= ROUNDING * x.abs().max(1.0);
+                                let near = (x - y).abs() <= ROUNDING * larger(x.abs(), 1.0);
                                 let same = near || x == y || (x.is_nan() && y.is_nan());
                                 assert!(same, "{place}, {}: {x:e} {y:e}", field.name);
                             }

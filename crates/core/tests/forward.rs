@@ -7,12 +7,13 @@ use polypod_core::batch::{self, Coordinates, Loads, States};
 use polypod_core::forward_kinematics::assembly_modes::{Modes, assembly_modes, start};
 use polypod_core::forward_kinematics::newton::{asked, error, forward_kinematics, polish, step_of};
 use polypod_core::kinematics::coordinate_sets::{MAX_COORDINATES, Set, Values};
-use polypod_core::kinematics::dependent_coordinates;
 use polypod_core::kinematics::jacobian::scaled_jacobian;
 use polypod_core::kinematics::leg;
+use polypod_core::mobility::independent_coordinates;
 use polypod_core::mobility::singularity::TOLERANCE;
 use polypod_core::model::mechanism::Mechanism;
 use polypod_core::model::status::Status;
+use polypod_core::number::order::{larger, largest, smaller};
 use polypod_core::numerics::gauss::solve;
 use polypod_core::spatial::{Mat3, Pose, Vec3};
 
@@ -22,7 +23,7 @@ fn lengths(mech: &Mechanism, pose: &Pose<f64>) -> Vec<f64> {
 
 /// o in metres and rotations in radians: largest difference.
 fn apart(a: &Pose<f64>, b: &Pose<f64>) -> f64 {
-    (a.o - b.o).norm().max((a.rotation.transpose() * b.rotation).rotation_vector().norm())
+    larger((a.o - b.o).norm(), (a.rotation.transpose() * b.rotation).rotation_vector().norm())
 }
 
 fn sign(mech: &Mechanism, pose: &Pose<f64>) -> f64 {
@@ -53,7 +54,7 @@ fn continued(mech: &Mechanism, to: &[f64], guess: &Pose<f64>) -> Option<Pose<f64
     let from = lengths(mech, guess);
     let (mut pose, mut t, mut h) = (*guess, 0.0_f64, 1e-3_f64);
     while t < 1.0 {
-        h = h.min(1.0 - t);
+        h = smaller(h, 1.0 - t);
         let between: Vec<f64> =
             from.iter().zip(to).map(|(a, b)| (a * a + (t + h) * (b * b - a * a)).sqrt()).collect();
         let next = polish(mech, &asked(mech, &between), &pose);
@@ -126,7 +127,7 @@ fn newton_converges_quadratically() {
 /// Every real pose that plain Newton iterations find from starts all over the space.
 fn many_starts(mech: &Mechanism, lengths: &[f64], starts: usize, draw: &mut Draw) -> Vec<Pose<f64>> {
     let home = mech.legs.iter().map(|l| leg::position(l, &mech.home).length);
-    let longest = home.chain(lengths.iter().copied()).fold(0.0, f64::max);
+    let longest = largest(home.chain(lengths.iter().copied()));
     let mut found: Vec<Pose<f64>> = Vec::new();
     for _ in 0..starts {
         let guess =
@@ -287,7 +288,7 @@ fn a_pose_with_a_leg_backwards_in_a_fixed_joint_is_none() {
             assert_eq!(table.status, [Status::Ok, none, third], "{letters}: {name}");
         }
         let (numbers, zero) = (Set::Pose.values(&mech, &backwards).map(|x| [x]), [0.0]);
-        let free = dependent_coordinates::best_given(&mech, &Set::Pose);
+        let free = independent_coordinates::best_given(&mech, &Set::Pose);
         let guess = backwards.matrix();
         for (all, guess) in [(true, None), (true, Some(&guess[..])), (false, Some(&guess))] {
             let series = |k: usize| (all || free[k]).then_some([&numbers[k][..], &zero, &zero]);

@@ -9,6 +9,7 @@ use polypod_core::dynamics::inverse_dynamics;
 use polypod_core::kinematics::chart::Chart;
 use polypod_core::kinematics::constraint;
 use polypod_core::model::mechanism::Mechanism;
+use polypod_core::number::order::larger;
 use polypod_core::number::real::{Dual, F, Real};
 use polypod_core::spatial::{Acceleration, Mat3, Motion, Pose, Twist, Vec3, Wrench};
 
@@ -33,7 +34,7 @@ fn accelerations_of_the_forces_of_a_motion_are_its_own() {
             close(found.acceleration.a, acceleration.a, EXACT, &mech.name);
             close(found.acceleration.eps, acceleration.eps, EXACT, &mech.name);
             for (multiplier, known) in found.multipliers.iter().zip(&f[mech.dof()..]) {
-                let size = f.iter().fold(1.0_f64, |m, x| m.max(x.abs()));
+                let size = f.iter().fold(1.0_f64, |m, x| larger(m, x.abs()));
                 assert!((multiplier - known).abs() < EXACT * size, "{}", mech.name);
             }
         }
@@ -55,7 +56,7 @@ fn the_same_source_serves_every_number() {
             let mut more = forces.clone();
             more[0] += 100.0;
             let next = driven(&mech, &pose, &twist, &more);
-            let size = plain.iter().chain(&next).fold(1.0_f64, |m, x| m.max(x.abs()));
+            let size = plain.iter().chain(&next).fold(1.0_f64, |m, x| larger(m, x.abs()));
             for i in 0..6 {
                 assert!((plain[i] - fused[i].0).abs() < EXACT * size, "{}", mech.name);
                 assert_eq!(dual[i].x, plain[i]);
@@ -73,7 +74,7 @@ fn the_terms_add_up_to_the_resultant() {
             let (v, a) = (twist.array(), acceleration.array());
             let motion = Motion { pose, twist, acceleration };
             let known = inverse_dynamics::resultant(&mech, &motion, Wrench::zero()).array();
-            let size = known.iter().fold(1.0_f64, |m, x| m.max(x.abs()));
+            let size = known.iter().fold(1.0_f64, |m, x| larger(m, x.abs()));
             for i in 0..6 {
                 let sum: f64 =
                     (0..6).map(|j| e.mass[i][j] * a[j] + (e.coriolis[i][j] + e.damping[i][j]) * v[j]).sum();
@@ -118,7 +119,7 @@ fn charts_keep_the_constraints_and_know_their_rates() {
                 rate(before.twist.omega, after.twist.omega),
             );
             let second = chart.second_rates(&now, &acceleration);
-            let size = acceleration.array().iter().fold(1.0_f64, |m, x| m.max(x.abs()));
+            let size = acceleration.array().iter().fold(1.0_f64, |m, x| larger(m, x.abs()));
             assert!(second.iter().all(|s| s.abs() < 1e-5 * size), "{}: {second:?}", mech.name);
         }
     }

@@ -11,6 +11,7 @@ use polypod_core::kinematics::jacobian;
 use polypod_core::kinematics::leg;
 use polypod_core::kinematics::quadratic_forms;
 use polypod_core::model::mechanism::Mechanism;
+use polypod_core::number::order::{larger, largest};
 use polypod_core::number::real::{Dual, F, Real, Scalar};
 use polypod_core::spatial::{Acceleration, Mat3, Motion, Pose, Twist, Vec3, Wrench};
 
@@ -212,7 +213,7 @@ fn carrying_a_wrench_keeps_its_power() {
                 let power = force.dot(v_b) + torque.dot(whole.turn.omega);
                 let carried = leg::carry(leg, &whole, force, torque).power(&state.twist);
                 assert!(
-                    (carried - power).abs() <= EXACT * power.abs().max(1.0),
+                    (carried - power).abs() <= EXACT * larger(power.abs(), 1.0),
                     "{} {}",
                     mech.name,
                     leg.letters()
@@ -262,7 +263,7 @@ fn power_balances() {
                 + mech.angular_damping * state.twist.omega.dot(state.twist.omega));
             let friction = (1.0 / mech.efficiency - 1.0) * own.power(&state.twist);
             let terms = [actuators, load.power(&state.twist), damping, friction, -kinetic, -potential];
-            let scale = terms.iter().fold(0.0_f64, |m, t| m.max(t.abs()));
+            let scale = largest(terms.iter().map(|t| t.abs()));
             let residual: f64 = terms.iter().sum();
             assert!(residual.abs() <= 1e-10 * scale, "{}: {residual:e} of {scale:e}", mech.name);
         }
@@ -303,7 +304,7 @@ fn the_same_source_serves_every_number() {
             let plain = forces::<f64>(&mech, &state);
             assert_eq!(plain, forces::<F<false>>(&mech, &state), "{}: unfused", mech.name);
             assert_eq!(plain, forces::<Dual<f64>>(&mech, &state), "{}: dual", mech.name);
-            let scale = plain.iter().fold(0.0_f64, |m, f| m.max(f.abs()));
+            let scale = largest(plain.iter().map(|f| f.abs()));
             for (a, b) in plain.iter().zip(forces::<F<true>>(&mech, &state)) {
                 assert!((a - b).abs() <= 1e-8 * scale, "{}: fused {b} against {a}", mech.name);
             }
@@ -335,7 +336,7 @@ fn duals_differentiate_the_inverse_dynamics() {
         let (exact, _) = inverse_dynamics::inverse_dynamics(&mech, &platform, load);
         // Forces are quadratic in the twist: central differences are exact up to rounding.
         let (above, below) = (at(0.5), at(-0.5));
-        let scale = exact.iter().fold(0.0_f64, |m, f| m.max(f.d.abs()));
+        let scale = largest(exact.iter().map(|f| f.d.abs()));
         for k in 0..6 {
             assert!((above[k] - below[k] - exact[k].d).abs() <= 1e-9 * scale, "force {k}");
         }

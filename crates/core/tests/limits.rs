@@ -15,6 +15,7 @@ use polypod_core::model::limit::Zero;
 use polypod_core::model::limit::{Bound, Limit, Measure, Strut};
 use polypod_core::model::mechanism::Mechanism;
 use polypod_core::model::spec::Axes;
+use polypod_core::number::order::larger;
 use polypod_core::spatial::distance::Hull;
 
 fn limit(measure: Measure, bound: Bound) -> Limit {
@@ -58,7 +59,7 @@ fn joints_are_measured_as_kinematics_measures_them_and_move_at_their_rates() {
                     limit(measure.clone(), Bound::Least(0.0)).geometric(&mech, &moving(&state)).unwrap();
                 assert!((found.x - value).abs() < 1e-12, "{}: {measure:?} {} {value}", mech.name, found.x);
                 let off = (found.d - rate).abs();
-                assert!(rate.is_nan() || off < 1e-10 * rate.abs().max(1.0), "{}: {measure:?}", mech.name);
+                assert!(rate.is_nan() || off < 1e-10 * larger(rate.abs(), 1.0), "{}: {measure:?}", mech.name);
             }
         }
     }
@@ -169,7 +170,7 @@ fn margins_of_many_poses_are_those_of_each() {
             for (k, (limit, margin)) in mech.limits.iter().zip(&alone).enumerate() {
                 let place = i * count + k;
                 let off = (margin - together[place]).abs();
-                assert!(off <= ROUNDING * margin.abs().max(1.0), "{}: {limit:?}", mech.name);
+                assert!(off <= ROUNDING * larger(margin.abs(), 1.0), "{}: {limit:?}", mech.name);
                 assert_eq!(margin.to_bits(), limit.margin(&mech, &motion.pose, Some(&forces)).to_bits());
                 assert_eq!((together[place] / limit.scale).to_bits(), relative[place].to_bits());
                 broken += usize::from(!(*margin >= 0.0));

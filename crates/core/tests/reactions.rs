@@ -9,6 +9,7 @@ use polypod_core::dynamics::joint_reactions::{self, Given, JointFrame};
 use polypod_core::dynamics::self_stress;
 use polypod_core::kinematics::leg;
 use polypod_core::model::mechanism::{Body, Mechanism};
+use polypod_core::number::order::{larger, largest};
 use polypod_core::number::real::{Dual, F, Jet, Real, Scalar};
 use polypod_core::spatial::{Acceleration, Mat3, Motion, Pose, Twist, Vec3, Wrench};
 
@@ -98,8 +99,7 @@ fn every_link_is_balanced_and_free_turns_carry_nothing() {
             let found =
                 self_stress::solve(&mech, &joints, &state, load(&mech, &state), length).expect("regular");
             for all in [&found.assumed, &found.least] {
-                let largest =
-                    all.iter().fold(0.0_f64, |m, w| m.max(w.force.norm()).max(w.torque.norm() / length));
+                let largest = largest(all.iter().flat_map(|w| [w.force.norm(), w.torque.norm() / length]));
                 for (name, link) in links(&mech, &state) {
                     let mut sum = link.given;
                     for ((joint, place), reaction) in joints.iter().zip(&found.places).zip(all) {
@@ -110,7 +110,7 @@ fn every_link_is_balanced_and_free_turns_carry_nothing() {
                             sum = sum - here;
                         }
                     }
-                    let left = sum.force.norm().max(sum.torque.norm() / length);
+                    let left = larger(sum.force.norm(), sum.torque.norm() / length);
                     assert!(left <= CLOSED * largest, "{}, {name}: {left:e} of {largest:e}", mech.name);
                 }
                 for ((joint, place), reaction) in joints.iter().zip(&found.places).zip(all) {
@@ -137,7 +137,7 @@ fn prismatic_joints_carry_the_active_forces() {
             let load = load(&mech, &state);
             let found = self_stress::solve(&mech, &joints, &state, load, 1.0).expect("regular");
             let (active, _) = inverse_dynamics::inverse_dynamics(&mech, &state, load);
-            let largest = active.iter().fold(0.0_f64, |m, f| m.max(f.abs()));
+            let largest = largest(active.iter().map(|f| f.abs()));
             let mut active = active.iter();
             for (i, leg) in mech.legs.iter().enumerate() {
                 let expected = if leg.actuated { *active.next().expect("one for each") } else { 0.0 };
@@ -253,8 +253,8 @@ fn the_constraint_wrench_is_what_others_leave() {
                         found.least[k].moved(found.places[k].point - state.pose.o)
                     };
             }
-            let largest = found.assumed.iter().fold(own.force.norm(), |m, w| m.max(w.force.norm()));
-            let left = rest.force.norm().max(rest.torque.norm());
+            let largest = found.assumed.iter().fold(own.force.norm(), |m, w| larger(m, w.force.norm()));
+            let left = larger(rest.force.norm(), rest.torque.norm());
             assert!(left <= CLOSED * largest, "{}: {left:e} of {largest:e}", mech.name);
         }
     }

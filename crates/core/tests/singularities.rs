@@ -9,6 +9,7 @@ use polypod_core::kinematics::jacobian;
 use polypod_core::kinematics::leg;
 use polypod_core::mobility::singularity::{self, Kind, TOLERANCE, determinant, singularity};
 use polypod_core::model::mechanism::{ConstraintKind, Mechanism};
+use polypod_core::number::order::larger;
 use polypod_core::spatial::{Mat3, Motion, Pose, Twist};
 
 /// The pose after a time on the motion with the constant twist.
@@ -29,7 +30,7 @@ fn the_determinant_is_that_of_the_jacobian_in_pure_numbers() {
                 let plain = Matrix6::from_fn(|i, k| j[i][k]).determinant();
                 let expected = plain * scale.powi(of_kind_d as i32 - 3);
                 let found = determinant(&mech, &state.pose, &Twist::zero(), scale);
-                assert!((found.x - expected).abs() < 1e-12 * expected.abs().max(1.0), "{}", mech.name);
+                assert!((found.x - expected).abs() < 1e-12 * larger(expected.abs(), 1.0), "{}", mech.name);
                 assert_eq!(found.d, 0.0);
             }
         }

@@ -9,6 +9,7 @@ use polypod_core::kinematics::leg;
 use polypod_core::mobility::singularity::conditioning;
 use polypod_core::model::limit::{Bound, Limit, Measure};
 use polypod_core::model::mechanism::Mechanism;
+use polypod_core::number::order::{larger, smaller};
 use polypod_core::spatial::{Pose, Vec3};
 use polypod_core::workspace::fit_orientation::fit;
 use polypod_core::workspace::flood_fill::{Edge, Flood, Grid, Stop};
@@ -114,7 +115,7 @@ fn extents(flood: &Flood, mech: &Mechanism) -> [[f64; 2]; 3] {
     let mut extents = [[f64::INFINITY, f64::NEG_INFINITY]; 3];
     for edge in flood.edges(mech) {
         for (extent, x) in extents.iter_mut().zip(edge.pose.o.array()) {
-            *extent = [extent[0].min(x), extent[1].max(x)];
+            *extent = [smaller(extent[0], x), larger(extent[1], x)];
         }
     }
     extents

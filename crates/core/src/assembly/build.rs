@@ -14,6 +14,7 @@ use crate::model::spec::Axes;
 use crate::model::spec::{
     ANGLE_TOLERANCE, BodySpec, Fault, JointSpec, LENGTH_TOLERANCE, LegSpec, RodSpec, Spec,
 };
+use crate::number::order::{larger, largest};
 use crate::number::real::count;
 use crate::number::real::{Constant, Scalar, Trig};
 use crate::spatial::{Mat3, Pose, Vec3, Wrench};
@@ -63,7 +64,7 @@ fn build(spec: &Spec, home: Pose<f64>) -> Mechanism {
     let reach: f64 = legs.iter().map(|leg| leg.platform.point.dot(leg.platform.point)).sum();
     let mean_square = reach / count(legs.len());
     // A platform that is a point has no size of its own; the home lengths then set the scale.
-    let longest = legs.iter().map(|leg| leg::position(leg, &home).length).fold(0.0, f64::max);
+    let longest = largest(legs.iter().map(|leg| leg::position(leg, &home).length));
     let is_point = mean_square.sqrt() <= LENGTH_TOLERANCE * longest;
     let characteristic_length = if is_point { longest } else { mean_square.sqrt() };
 
@@ -126,7 +127,7 @@ fn check_freedoms(mech: &Mechanism) -> Option<Fault> {
     let idle = mech.idle.len();
     if dof == 0 {
         let message = "together they leave the platform no degree of freedom; release a joint";
-        return Some(Fault::new("legs", message));
+        return Some(Fault::new("legs", format!("{message}{}", about_universal_joints(mech))));
     }
     if idle == dof {
         let all = if dof == 1 {
@@ -148,6 +149,21 @@ fn check_freedoms(mech: &Mechanism) -> Option<Fault> {
          actuated"
     );
     (actuators < needed).then(|| Fault::new("legs", message))
+}
+
+/// That legs with U joints at both ends do not spin, and which ones would.
+fn about_universal_joints(mech: &Mechanism) -> String {
+    let both = |leg: &&Leg| [leg.base_kind(), leg.platform.kind] == [JointKind::Universal; 2];
+    let names: Vec<&str> = mech.legs.iter().filter(both).map(|leg| &leg.name[..]).collect();
+    if names.is_empty() {
+        return String::new();
+    }
+    format!(
+        ". A leg with U joints at both ends (here {}) does not rotate about its own line, which takes a degree \
+         of freedom from the platform; a leg that should rotate freely has a spherical joint at one end, UPS \
+         or SPU",
+        names.join(", ")
+    )
 }
 
 /// Faults in the relations between parts.
@@ -178,7 +194,7 @@ fn check_rods(spec: &Spec) -> Vec<Fault> {
             let offset = leg.base.point - rod.point;
             let axis = rod.axis.unit();
             let off = (offset - axis * offset.dot(axis)).norm();
-            let scale = offset.norm().max(leg.base.point.norm()).max(rod.point.norm());
+            let scale = largest([offset.norm(), leg.base.point.norm(), rod.point.norm()]);
             if off > ANGLE_TOLERANCE * scale {
                 faults.push(Fault::new(
                     format!("legs.{}.base.point", j + 1),
@@ -202,7 +218,7 @@ fn check_rods(spec: &Spec) -> Vec<Fault> {
 /// Two legs with the same two points are one leg twice.
 fn check_ends(spec: &Spec) -> Vec<Fault> {
     let mut faults = Vec::new();
-    let same = |a: Vec3<f64>, b: Vec3<f64>| (a - b).norm() <= LENGTH_TOLERANCE * a.norm().max(b.norm());
+    let same = |a: Vec3<f64>, b: Vec3<f64>| (a - b).norm() <= LENGTH_TOLERANCE * larger(a.norm(), b.norm());
     for (j, second) in spec.legs.iter().enumerate() {
         for (i, first) in spec.legs.iter().enumerate().take(j) {
             let (Some(a), Some(b)) = (first, second) else {

@@ -4,7 +4,7 @@ use super::block::{self, Answers, At, Codes, Operation, Pieces};
 use super::checks::{any_pose, finite, kept, reached, read_pose};
 use super::{FieldId, Table};
 use crate::kinematics::coordinate_sets::Set;
-use crate::kinematics::dependent_coordinates;
+use crate::mobility::independent_coordinates;
 use crate::mobility::singularity;
 use crate::mobility::singularity_distance::{self, SingularitySearch};
 use crate::model::mechanism::Mechanism;
@@ -128,7 +128,7 @@ pub fn singularities(mech: &Mechanism, poses: &[f64], scale: f64, tolerance: f64
 #[must_use]
 pub fn searched_coordinates(mech: &Mechanism, set: &Set, names: Option<&[String]>) -> Vec<bool> {
     names.map_or_else(
-        || dependent_coordinates::best_given(mech, set),
+        || independent_coordinates::best_given(mech, set),
         |names| set.names().iter().map(|name| names.iter().any(|n| n == name)).collect(),
     )
 }

@@ -7,6 +7,7 @@ use crate::kinematics::jacobian::{MotionSolver, PlatformMotion};
 use crate::kinematics::rows::RowNumbers;
 use crate::mobility::degrees_of_freedom;
 use crate::model::mechanism::Mechanism;
+use crate::number::order::largest;
 use crate::numerics::random::Random;
 use crate::spatial::{Acceleration, Mat3, Motion, Pose, Twist};
 
@@ -118,7 +119,7 @@ fn random_state(mech: &Mechanism, draw: &mut Random) -> Option<Motion<f64>> {
 /// Columns that are no combination of those before them, by orthogonalisation in order, and for every column
 /// what is left of it.
 fn independent_columns(m: &DMatrix<f64>) -> (Vec<usize>, Vec<f64>) {
-    let largest = m.column_iter().map(|c| c.norm()).fold(0.0, f64::max);
+    let largest = largest(m.column_iter().map(|c| c.norm()));
     let mut basis: Vec<DVector<f64>> = Vec::new();
     let (mut columns, mut remainders) = (Vec::new(), Vec::new());
     for (j, column) in m.column_iter().enumerate() {

@@ -16,6 +16,7 @@ use crate::model::mechanism::Idle;
 use crate::model::mechanism::{Leg, Mechanism};
 use crate::model::spec::Axes;
 use crate::model::status::Status;
+use crate::number::order::{by_size, larger, largest, smaller};
 use crate::number::real::Real;
 use crate::number::real::count;
 use crate::numerics::random::Random;
@@ -123,7 +124,8 @@ impl Mirror {
         let (base_point, base_normal) = plane(&base)?;
         let (platform_point, platform_normal) = plane(&platform)?;
         // Axes must be their own images, up to their sign.
-        let kept = |a: Vec3<f64>, n: Vec3<f64>| a.dot(n).abs().min(a.cross(n).norm()) <= 1e-12 * a.norm();
+        let kept =
+            |a: Vec3<f64>, n: Vec3<f64>| smaller(a.dot(n).abs(), a.cross(n).norm()) <= 1e-12 * a.norm();
         mech.constraints
             .iter()
             .all(|c| kept(c.base_axis, base_normal) && kept(c.platform_axis, platform_normal))
@@ -149,13 +151,13 @@ impl Mirror {
 fn plane(points: &[Vec3<f64>]) -> Option<(Vec3<f64>, Vec3<f64>)> {
     let first = *points.first()?;
     let far = |from: Vec3<f64>| {
-        points.iter().map(|&p| p - from).max_by(|a, b| a.norm().total_cmp(&b.norm())).unwrap_or(Vec3::zero())
+        points.iter().map(|&p| p - from).max_by(|a, b| by_size(a.norm(), b.norm())).unwrap_or(Vec3::zero())
     };
     let along = far(first);
     let normal = points
         .iter()
         .map(|&p| along.cross(p - first))
-        .max_by(|a, b| a.norm().total_cmp(&b.norm()))
+        .max_by(|a, b| by_size(a.norm(), b.norm()))
         .unwrap_or(Vec3::zero());
     let size = along.norm();
     if !(normal.norm() > 1e-9 * size * size) {
@@ -231,10 +233,10 @@ fn distance(mech: &Mechanism, a: &Pose<C>, b: &Pose<C>) -> f64 {
     if let [idle] = &mech.idle[..] {
         return distance_of_lines(mech, idle, a, b);
     }
-    let size = a.rotation.0.into_iter().map(modulus).fold(1.0, f64::max);
-    let turned = a.rotation.0.iter().zip(b.rotation.0).map(|(&p, q)| modulus(p - q)).fold(0.0, f64::max);
+    let size = a.rotation.0.into_iter().map(modulus).fold(1.0, larger);
+    let turned = largest(a.rotation.0.iter().zip(b.rotation.0).map(|(&p, q)| modulus(p - q)));
     let moved = modulus(a.o - b.o) / (mech.characteristic_length + modulus(a.o));
-    (turned / (size * size)).max(moved / size)
+    larger(turned / (size * size), moved / size)
 }
 
 /// Direction and point of the line of a local degree of freedom at a pose, seen from the other body.
@@ -249,8 +251,8 @@ fn line<T: Real>(idle: &Idle, pose: &Pose<T>) -> (Vec3<T>, Vec3<T>) {
 /// Distance of two poses apart from the spin of a local degree of freedom: that of its line \[T71\].
 fn distance_of_lines(mech: &Mechanism, idle: &Idle, a: &Pose<C>, b: &Pose<C>) -> f64 {
     let ((u, p), (v, q)) = (line(idle, a), line(idle, b));
-    let size = modulus(u).max(1.0);
-    (modulus(u - v) / (size * size)).max(modulus(p - q) / (mech.characteristic_length + modulus(p)) / size)
+    let size = larger(modulus(u), 1.0);
+    larger(modulus(u - v) / (size * size), modulus(p - q) / (mech.characteristic_length + modulus(p)) / size)
 }
 
 /// The pose with the idle line where it is, and the spin that is the shortest rotation from home: a real one
@@ -261,7 +263,7 @@ fn unspun(mech: &Mechanism, pose: &Pose<C>) -> Pose<C> {
     let (axis, point) = line(idle, pose);
     let (home, _) = line(idle, &mech.home);
     let turn = Mat3::shortest_turn(home, real(axis).unit());
-    let imaginary = |a: Vec3<C>| a.array().iter().map(|e| e.im.abs()).fold(0.0, f64::max);
+    let imaginary = |a: Vec3<C>| largest(a.array().iter().map(|e| e.im.abs()));
     let (fixed, off) = (Vec3::lift(idle.point), C::new(0.0, imaginary(axis)));
     let mut found = Pose::lift(&mech.home);
     match idle.side {
@@ -395,7 +397,7 @@ fn real_mode(mech: &Mechanism, asked: &[LegTarget<f64>; 6], pose: &Pose<C>, up: 
     let pose = &unspun(mech, pose);
     let o = pose.o * C::lit(1.0 / mech.characteristic_length);
     let parts = pose.rotation.0.iter().flat_map(|c| c.array()).chain(o.array());
-    let imaginary = parts.map(|e| e.im.abs()).fold(0.0, f64::max);
+    let imaginary = largest(parts.map(|e| e.im.abs()));
     if !(imaginary <= IMAGINARY_MEETING) {
         return None;
     }
@@ -404,7 +406,7 @@ fn real_mode(mech: &Mechanism, asked: &[LegTarget<f64>; 6], pose: &Pose<C>, up: 
     let (x, z) = (x.unit(), x.cross(y).unit());
     let guess = Pose { rotation: Mat3::from_columns(x, z.cross(x), z), o: real(pose.o) };
     let FoundPose { pose: found, sign, residual, status, .. } = newton::polish(mech, asked, &guess);
-    let longest = asked.iter().map(|a| a.square).fold(0.0, f64::max).sqrt();
+    let longest = largest(asked.iter().map(|a| a.square)).sqrt();
     let moved = distance(mech, &Pose::lift(&found), pose);
     // Off the real poses there are real ones nearby only where modes meet.
     let real = imaginary <= IMAGINARY || status == Status::Singular;

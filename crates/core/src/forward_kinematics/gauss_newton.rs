@@ -15,6 +15,7 @@ use crate::mobility::degrees_of_freedom::RANK_TOLERANCE;
 use crate::model::mechanism::Mechanism;
 use crate::model::status::Status;
 use crate::number::lanes::{self, Lanes, Task, WIDTH};
+use crate::number::order::{larger, smaller};
 use crate::number::slices::pairs;
 use crate::numerics::svd::Svd;
 use crate::spatial::motion::pure_row;
@@ -203,11 +204,11 @@ impl<'a> Search<'a> {
             (None, Some(found)) => self.at = Some(found),
             (Some(at), found) => {
                 let near = at.size <= NEAR;
-                let promised = 0.1 * self.share * (at.merit - at.left).max(0.0);
+                let promised = 0.1 * self.share * larger(at.merit - at.left, 0.0);
                 match found {
                     Some(found) if near || found.merit <= at.merit - promised => {
                         (self.pose, self.at) = (trial, Some(found));
-                        self.share = (2.0 * self.share).min(1.0);
+                        self.share = smaller(2.0 * self.share, 1.0);
                         // Rounding shrinks no further.
                         if near && found.size >= 0.9 * at.size {
                             return;
@@ -222,7 +223,7 @@ impl<'a> Search<'a> {
         }
         let Some(at) = self.at.filter(|at| at.size > ROUNDING && self.iterations < STEPS) else { return };
         self.iterations += 1;
-        self.share = self.share.min(LONGEST_STEP / at.size);
+        self.share = smaller(self.share, LONGEST_STEP / at.size);
         self.trial = Some(self.pose.stepped(&step_of(self.mech, at.step, self.share)));
     }
 

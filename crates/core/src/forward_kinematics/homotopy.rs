@@ -7,6 +7,7 @@ use crate::kinematics::leg;
 use crate::model::mechanism::Mechanism;
 use crate::number::complex::Complex;
 use crate::number::lanes::{self, Lanes, Row, Task, WIDTH};
+use crate::number::order::{larger, smaller};
 use crate::number::real::{Ordered, Real};
 use crate::numerics::gauss::{Solved, solve, solve_all};
 use crate::spatial::Pose;
@@ -146,7 +147,7 @@ impl TrackedPath {
 
     /// Whether a second Newton step is as much smaller than the first as it must be.
     fn contracts(&self, size: f64, precision: f64) -> bool {
-        size <= (0.1 * precision * precision.max(self.error)).max(CLOSE)
+        size <= larger(0.1 * precision * larger(precision, self.error), CLOSE)
     }
 
     /// Goes on if the error of a prediction permits it, and sets the next step: errors grow with its fifth
@@ -164,7 +165,7 @@ impl TrackedPath {
                 ..*self
             };
         } else {
-            self.h *= factor.min(0.5);
+            self.h *= smaller(factor, 0.5);
         }
         good
     }
@@ -220,7 +221,7 @@ impl<F: Family> HomotopyPath<F> {
                     copy(&before.0, &mut place, k);
                     copy(&before.1, &mut rate, k);
                 }
-                who.h = who.h.min(1.0 - who.t);
+                who.h = smaller(who.h, 1.0 - who.t);
                 if arrived {
                     (ends[who.start], *traveller) =
                         (PathEnd::Regular(PathPoint::get(&place, k).pose()), None);
@@ -400,6 +401,7 @@ mod tests {
     use crate::common;
     use crate::forward_kinematics::path_point::tests::complex_places;
     use crate::number::lanes::tests::on_each_width;
+    use crate::number::order::largest;
     use crate::numerics::random::Random;
 
     #[derive(Clone, Copy)]
@@ -454,12 +456,8 @@ mod tests {
             let step = solve(matrix, residual.map(|f| -f)).x;
             let correction = places[3].along(&mech, &step);
             let found = PathPoint::get(&all[0].correction, 3);
-            let error = found.q.iter().zip(correction.q).map(|(&a, b)| (a - b).norm()).fold(0.0, f64::max);
-            assert!(
-                error < 1e-9 * correction.q.iter().map(|q| q.norm()).fold(1.0, f64::max),
-                "{}",
-                mech.name
-            );
+            let error = largest(found.q.iter().zip(correction.q).map(|(&a, b)| (a - b).norm()));
+            assert!(error < 1e-9 * correction.q.iter().map(|q| q.norm()).fold(1.0, larger), "{}", mech.name);
         }
     }
 }

@@ -9,6 +9,7 @@ use crate::kinematics::leg;
 use crate::kinematics::rows::{Row, for_each_row};
 use crate::model::mechanism::{Leg, Mechanism};
 use crate::model::status::Status;
+use crate::number::order::smaller;
 use crate::number::real::{Ordered, Real};
 use crate::number::slices::pairs;
 use crate::numerics::gauss::solve;
@@ -287,7 +288,7 @@ pub fn continuation(
     let sign = solve(matrix, errors).sign;
     let (mut pose, mut t, mut piece, mut steps) = (*guess, 0.0, 1.0_f64, 0);
     while t < 1.0 {
-        piece = piece.min(1.0 - t);
+        piece = smaller(piece, 1.0 - t);
         let rest = errors.map(|e| (1.0 - t - piece) * e);
         let (mut trial, mut last, mut arrived) = (pose, f64::INFINITY, false);
         for _ in 0..PIECE_STEPS {
@@ -325,14 +326,14 @@ pub fn polish(mech: &Mechanism, asked: &[LegTarget<f64>; 6], guess: &Pose<f64>) 
     let mut at = newton(mech, &pose, asked, &[0.0; 6]);
     let (mut share, mut iterations) = (1.0_f64, 0);
     while !(at.residual <= ROUNDING) && iterations < NEWTON_STEPS {
-        share = share.min(LONGEST_STEP / at.size);
+        share = smaller(share, LONGEST_STEP / at.size);
         let trial_pose = pose.stepped(&step_of(mech, at.step, share));
         let trial = newton(mech, &trial_pose, asked, &[0.0; 6]);
         iterations += 1;
         // The last step of a quadratic iteration ends in rounding, whatever it does to the residual.
         let last = at.size <= SMALL_STEP && trial.residual <= MOST_ROUNDING;
         if last || trial.residual <= (1.0 - 0.1 * share) * at.residual {
-            (pose, at, share) = (trial_pose, trial, (2.0 * share).min(1.0));
+            (pose, at, share) = (trial_pose, trial, smaller(2.0 * share, 1.0));
         } else {
             share *= 0.25;
         }

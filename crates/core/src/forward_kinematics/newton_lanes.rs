@@ -222,8 +222,11 @@ pub(crate) fn newton<V: Lanes>(
 ) -> NewtonStep<V> {
     let System { residual, matrix } = system(mech, pose, &load_asked(mech, numbers, k));
     let (mut rhs, mut largest, mut sum) = (residual, V::zero(), V::zero());
+    // NaN if an equation's value is not finite, else zero.
+    let mut unknown = V::zero();
     for f in &mut rhs {
         largest = largest.most(f.abs());
+        unknown = f.mul_add(V::zero(), unknown);
         *f = -*f;
     }
     let Solved { x, pivots, sign } = solve(matrix, rhs);
@@ -231,7 +234,7 @@ pub(crate) fn newton<V: Lanes>(
         sum = sum + e * e;
     }
     let next = pose.stepped(&step_of(mech, x, V::one()));
-    NewtonStep { next, size: sum.sqrt(), residual: largest, pivots, sign }
+    NewtonStep { next, size: sum.sqrt(), residual: largest + unknown, pivots, sign }
 }
 
 /// What varies of the legs of a state: see [`numbers`](crate::forward_kinematics::newton::numbers).

@@ -4,6 +4,7 @@ use crate::model::mechanism::Mechanism;
 use crate::model::spec::Axes;
 use crate::number::complex::Complex;
 use crate::number::lanes::{Lanes, Row};
+use crate::number::order::larger;
 use crate::number::real::Real;
 use crate::spatial::{Mat3, Pose, Vec3};
 
@@ -102,7 +103,7 @@ impl PathPoint<C> {
     pub(super) fn size(&self, mech: &Mechanism) -> f64 {
         let q = self.q.iter().fold(C::zero(), |sum, &e| sum + e * e).norm();
         let turned = self.q.iter().map(|e| e.norm_sqr()).sum::<f64>() / q;
-        (modulus(self.o) / mech.characteristic_length).max(turned)
+        larger(modulus(self.o) / mech.characteristic_length, turned)
     }
 
     pub(super) fn get(block: &Block, k: usize) -> Self {

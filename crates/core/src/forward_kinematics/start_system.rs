@@ -207,6 +207,7 @@ mod tests {
     use super::*;
     use crate::common;
     use crate::forward_kinematics::newton::FOLD_PIVOTS;
+    use crate::number::order::largest;
     use crate::numerics::gauss::solve;
 
     fn dot(x: &[C], y: &[C]) -> C {
@@ -227,7 +228,7 @@ mod tests {
             assert_eq!(solutions.len(), 128 << rods, "{}", mech.name);
             for pose in &solutions {
                 let (System { residual, matrix }, _) = products.at(&PathPoint::of(pose), 0.0);
-                let sizes = matrix.map(|row| row.iter().map(|c| c.norm()).fold(0.0, f64::max));
+                let sizes = matrix.map(|row| largest(row.iter().map(|c| c.norm())));
                 for (f, size) in residual.iter().zip(sizes) {
                     assert!(f.norm() < 1e-10 * size, "{}: {f:?} of {size}", mech.name);
                 }
@@ -253,7 +254,7 @@ mod tests {
                 let moved = |h: f64| residual(&(place + place.along(&mech, &unit(h))), t);
                 let (after, before) = (moved(h), moved(-h));
                 for i in 0..6 {
-                    let size = matrix[i].iter().map(|c| c.norm()).fold(0.0, f64::max);
+                    let size = largest(matrix[i].iter().map(|c| c.norm()));
                     // No rotation changes the residual of an idle spin's equation alone.
                     assert!(close(matrix[i][j], after[i], before[i], 10.0 * size), "{}: {i} {j}", mech.name);
                 }
@@ -299,7 +300,7 @@ mod tests {
                 // The difference of the next order vanishes, that of the degree does not.
                 let degree = products.forms[i].len();
                 let mut values: Vec<C> = (0..=degree + 1).map(|s| equations(s as f64)[i]).collect();
-                let size = values.iter().map(|v| v.norm()).fold(0.0, f64::max);
+                let size = largest(values.iter().map(|v| v.norm()));
                 for _ in 0..degree {
                     values = values.windows(2).map(|pair| pair[1] - pair[0]).collect();
                 }

@@ -6,6 +6,7 @@ use crate::kinematics::quadratic_forms::{Hessian, add_centripetal, add_mixed, po
 use crate::model::joint::Normal;
 use crate::model::mechanism::{Constraint, ConstraintKind, Leg, Mechanism, Partner};
 use crate::model::spec::{ANGLE_TOLERANCE, LENGTH_TOLERANCE};
+use crate::number::order::larger;
 use crate::number::real::{Constant, Ordered, Real, Scalar, Trig};
 use crate::spatial::{Mat3, Pose, Vec3, Wrench};
 
@@ -93,7 +94,7 @@ pub fn of_rod<S: Trig + Constant<S>>(
     let point = |i: usize| mech_legs[i].platform.point.map(Real::value);
     let apart = |i: &&usize| {
         let (a, b) = (point(leader), point(**i));
-        (a - b).norm() > LENGTH_TOLERANCE * a.norm().max(b.norm())
+        (a - b).norm() > LENGTH_TOLERANCE * larger(a.norm(), b.norm())
     };
     others.iter().filter(apart).map(make).collect()
 }
@@ -240,7 +241,7 @@ pub(crate) const VANISHING_ROW: f64 = 1e-6;
 /// Divisor that normalises a row; a row that vanishes stays as small as it is.
 #[must_use]
 pub fn row_unit(row: &Wrench<f64>, scale: f64) -> f64 {
-    row_size(row, scale).max(VANISHING_ROW)
+    larger(row_size(row, scale), VANISHING_ROW)
 }
 
 /// How far the platform must move to satisfy the constraint, to first order, rotations counted as arcs at

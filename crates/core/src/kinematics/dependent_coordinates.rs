@@ -287,24 +287,12 @@ pub(super) fn residual<N: Real>(mech: &Mechanism<impl Constant<N>>, pose: &Pose<
     values
 }
 
-/// Which numbers of the set to give so that the constraints determine the others best at the home pose.
+/// Pivot ratio of ∂g/∂y at a pose, y being the numbers of the set that are not given: how well the constraints
+/// determine them there. NaN where it is not known.
 #[must_use]
-pub fn best_given(mech: &Mechanism, set: &Set) -> Vec<bool> {
-    if let Some(given) = set.given(mech) {
-        return given;
-    }
-    let (count, wanted) = (set.names().len(), mech.independent.len());
-    let home = set.values(mech, &mech.home).map(Jet::lit);
-    let mut best = (-1.0, vec![true; count]);
-    for mask in (0..1_usize << count).filter(|mask| mask.count_ones() as usize == wanted) {
-        let given: Vec<bool> = (0..count).map(|i| mask >> i & 1 == 0).collect();
-        let dependent = Dependent::of(set, &given);
-        let pivots = solve(gradient(mech, set, &home, &dependent), [0.0; MAX_CONSTRAINTS]).pivots;
-        if pivots > best.0 {
-            best = (pivots, given);
-        }
-    }
-    best.1
+pub fn dependent_pivots(mech: &Mechanism, set: &Set, pose: &Pose<f64>, given: &[bool]) -> f64 {
+    let q = set.values(mech, pose).map(Jet::lit);
+    solve(gradient(mech, set, &q, &Dependent::of(set, given)), [0.0; MAX_CONSTRAINTS]).pivots
 }
 
 /// Unit of a dependent coordinate's step: the characteristic length, or a radian.

@@ -8,6 +8,7 @@ use crate::kinematics::constraint;
 use crate::kinematics::leg;
 use crate::model::mechanism::{Constraint, Idle, Leg, Mechanism};
 use crate::model::spec::Axes;
+use crate::number::order::by_size;
 use crate::number::real::{Constant, Real, Scalar};
 use crate::numerics::svd::Svd;
 use crate::spatial::motion::pure_row;
@@ -183,7 +184,7 @@ fn line(mech: &Mechanism, side: Axes, turn: &Twist<f64>) -> Idle {
     if !mech.legs.iter().all(on_it) {
         return idle;
     }
-    let order = |a: &usize, b: &usize| along(&mech.legs[*a]).total_cmp(&along(&mech.legs[*b]));
+    let order = |a: &usize, b: &usize| by_size(along(&mech.legs[*a]), along(&mech.legs[*b]));
     let ends = (0..mech.legs.len()).min_by(order).zip((0..mech.legs.len()).max_by(order));
     let apart = |[a, b]: &[usize; 2]| along(&mech.legs[*b]) - along(&mech.legs[*a]) > FIXED * scale;
     let through = ends.map(|(first, last)| [first, last]).filter(apart);

@@ -317,13 +317,14 @@ mod tests {
     use crate::common::{Draw, pentapod, redundant, states};
     use crate::kinematics::jacobian::MotionSolver;
     use crate::kinematics::rows::{all_rows, pure_rows};
+    use crate::number::order::largest;
 
     fn mechanisms() -> Vec<Mechanism> {
         vec![redundant(1), redundant(2), pentapod(6, "platform", 3), pentapod(7, "base", 4)]
     }
 
-    fn largest(parts: impl IntoIterator<Item = f64>) -> f64 {
-        parts.into_iter().fold(0.0, |most: f64, x| most.max(x.abs()))
+    fn largest_size(parts: impl IntoIterator<Item = f64>) -> f64 {
+        largest(parts.into_iter().map(f64::abs))
     }
 
     #[test]
@@ -344,8 +345,8 @@ mod tests {
                 let of_legs = (0..n).map(|i| forces[i] - rows[i].power(&found.motion) - preferred[i]);
                 let balance = rows.iter().zip(&forces).fold(w, |sum, (row, f)| sum - *row * *f);
                 let of_others = (n..rows.len()).map(|k| rows[k].power(&found.motion) - rates[k - n]);
-                let missed = largest(of_legs.chain(balance.array()).chain(of_others));
-                let size = 1.0 + found.motion.v.norm() + largest(forces.iter().copied());
+                let missed = largest_size(of_legs.chain(balance.array()).chain(of_others));
+                let size = 1.0 + found.motion.v.norm() + largest_size(forces.iter().copied());
                 assert!(missed < 1e-12 * size, "{}: {missed}", mech.name);
             }
         }
@@ -378,7 +379,7 @@ mod tests {
             found.put_freedoms(&mut twists);
             let first = mech.rows() - mech.independent.len();
             for row in &pure_rows(&mech, &mech.home, mech.characteristic_length)[first..] {
-                assert!(largest(twists.iter().map(|twist| dot(row, twist))) < 1e-14, "{}", mech.name);
+                assert!(largest_size(twists.iter().map(|twist| dot(row, twist))) < 1e-14, "{}", mech.name);
             }
             for (i, a) in twists.iter().enumerate() {
                 for (j, b) in twists.iter().enumerate() {
@@ -401,7 +402,7 @@ mod tests {
                 assert!(found.regular > 1e-12 && found.agrees);
                 let off = Twist::new(found.motion.v - state.twist.v, found.motion.omega - state.twist.omega);
                 assert!(off.v.norm() + off.omega.norm() < 1e-10, "{}", mech.name);
-                solver.driven[0] += 1e-3 * largest(solver.driven.iter().copied());
+                solver.driven[0] += 1e-3 * largest_size(solver.driven.iter().copied());
                 assert!(!solver.twist(&mech, &state.pose).agrees, "{}", mech.name);
             }
         }

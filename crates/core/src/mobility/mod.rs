@@ -1,4 +1,5 @@
 pub mod degrees_of_freedom;
+pub mod independent_coordinates;
 pub mod screw_systems;
 pub mod singularity;
 pub mod singularity_distance;

@@ -6,6 +6,7 @@ use nalgebra::DMatrix;
 use crate::kinematics::constraint;
 use crate::mobility::singularity::{Screw, screw};
 use crate::model::mechanism::Mechanism;
+use crate::number::order::{by_size, largest};
 use crate::numerics::svd::Svd;
 use crate::spatial::motion::pure_row;
 use crate::spatial::{Pose, Twist, Vec3, Wrench};
@@ -120,7 +121,7 @@ fn nearest_to_base(twists: &[Twist<f64>], direction: impl Fn(&Twist<f64>) -> Vec
     };
     let upright = |(_, twist): (f64, Twist<f64>)| {
         let parts = direction(&twist).array();
-        let largest = parts.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
+        let largest = largest(parts.iter().map(|x| x.abs()));
         let first = parts.iter().find(|x| x.abs() > (1.0 - NOTHING) * largest);
         sum(&[twist], |_| if first.is_some_and(|x| *x < 0.0) { -1.0 } else { 1.0 })
     };
@@ -136,7 +137,7 @@ fn diagonal(twists: &[Twist<f64>], form: impl Fn(&Twist<f64>, &Twist<f64>) -> f6
     let eigen = DMatrix::from_fn(n, n, |i, j| form(&twists[i], &twists[j])).symmetric_eigen();
     let mut found: Vec<(f64, Twist<f64>)> =
         (0..n).map(|k| (eigen.eigenvalues[k], sum(twists, |i| eigen.eigenvectors[(i, k)]))).collect();
-    found.sort_by(|a, b| a.0.total_cmp(&b.0));
+    found.sort_by(|a, b| by_size(a.0, b.0));
     found
 }
 
@@ -152,6 +153,7 @@ fn sum(twists: &[Twist<f64>], share: impl Fn(usize) -> f64) -> Twist<f64> {
 mod tests {
     use super::*;
     use crate::common::{mechanisms, states};
+    use crate::number::order::larger;
 
     #[test]
     fn freedoms_are_principal_and_feel_no_constraint() {
@@ -185,7 +187,7 @@ mod tests {
                         }
                         if !slides && !other.pitch.is_infinite() {
                             let form = a.omega.dot(b.v) + b.omega.dot(a.v);
-                            assert!(form.abs() <= 1e-7 * scale.max(a.v.norm() + b.v.norm()), "{form}");
+                            assert!(form.abs() <= 1e-7 * larger(scale, a.v.norm() + b.v.norm()), "{form}");
                         }
                     }
                 }

@@ -7,6 +7,7 @@ use crate::kinematics::idle;
 use crate::kinematics::leg;
 use crate::kinematics::rows::{constraint_row, gram, pure_jacobian, pure_rows};
 use crate::model::mechanism::{Constraint, Leg, Mechanism};
+use crate::number::order::larger;
 use crate::number::real::{Dual, Ordered};
 use crate::numerics::gauss;
 use crate::numerics::svd::Svd;
@@ -273,9 +274,9 @@ pub fn singularity(mech: &Mechanism, pose: &Pose<f64>, scale: f64, tolerance: f6
     let first_zero = |values: &[f64], limit: f64| values.iter().position(|&x| x <= limit);
     let row_size = |c: &Constraint| constraint_row(c, pose, scale).iter().map(|e| e * e).sum::<f64>().sqrt();
     let vanishing = mech.constraints.iter().find(|c| row_size(c) <= tolerance);
-    let (kind, leg) = if let Some(leg) = first_zero(&leg_length, tolerance.max(TOLERANCE)) {
+    let (kind, leg) = if let Some(leg) = first_zero(&leg_length, larger(tolerance, TOLERANCE)) {
         (Kind::LegLength, Some(leg))
-    } else if let Some(leg) = first_zero(&across, tolerance.max(TOLERANCE)) {
+    } else if let Some(leg) = first_zero(&across, larger(tolerance, TOLERANCE)) {
         (Kind::StrutAcrossRail, Some(leg))
     } else if let (true, Some(c)) = (allowed.lost, vanishing) {
         (Kind::ConstraintVanishes, Some(c.leg))

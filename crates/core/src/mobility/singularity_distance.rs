@@ -9,6 +9,7 @@ use crate::kinematics::dependent_coordinates::{self, CoordinateState};
 use crate::mobility::singularity::{self, Kind, TOLERANCE};
 use crate::model::mechanism::Mechanism;
 use crate::model::status::Status;
+use crate::number::order::{larger, largest};
 use crate::number::real::{Jet, Real};
 use crate::numerics::hermite_roots::{self, Node};
 use crate::spatial::{Pose, Vec3};
@@ -94,7 +95,7 @@ fn mask(search: &SingularitySearch) -> Vec<bool> {
 
 fn same(a: &Pose<f64>, b: &Pose<f64>, scale: f64) -> bool {
     let turned = a.rotation.0.iter().zip(b.rotation.0).map(|(x, y): (&Vec3<f64>, _)| (*x - y).norm());
-    (a.o - b.o).norm() <= SAME_POSE * scale && turned.fold(0.0, f64::max) <= SAME_POSE
+    (a.o - b.o).norm() <= SAME_POSE * scale && largest(turned) <= SAME_POSE
 }
 
 /// The poses that one coordinate passes, by the way from its value at the start; the others are kept.
@@ -158,7 +159,7 @@ impl CoordinatePath<'_> {
         let here = self.pose(way).and_then(|pose| self.kind(&pose, TOLERANCE));
         here.or_else(|| {
             let before =
-                SHORTLY_BEFORE.into_iter().find_map(|share| self.pose((way - share * step).max(0.0)));
+                SHORTLY_BEFORE.into_iter().find_map(|share| self.pose(larger(way - share * step, 0.0)));
             before.and_then(|pose| self.kind(&pose, NEAR))
         })
     }

@@ -5,6 +5,7 @@ use nalgebra::DVector;
 use crate::kinematics::rows::pure_rows;
 use crate::mobility::degrees_of_freedom::{RANK_TOLERANCE, generic_poses};
 use crate::model::mechanism::Mechanism;
+use crate::number::order::{by_size, smaller};
 use crate::spatial::Pose;
 
 /// Remainder of a row below which it is rounding.
@@ -36,15 +37,15 @@ pub fn sufficient_actuators(mech: &Mechanism) -> Option<Mechanism> {
         while basis.len() < 6 {
             let left =
                 (0..numbers.len()).filter(|k| !chosen.contains(k)).map(|k| (k, rest(&basis, &rows[k])));
-            let (k, row) = left.max_by(|a, b| a.1.norm().total_cmp(&b.1.norm()))?;
-            least = least.min(row.norm());
+            let (k, row) = left.max_by(|a, b| by_size(a.1.norm(), b.1.norm()))?;
+            least = smaller(least, row.norm());
             basis.push(row.try_normalize(RANK_TOLERANCE)?);
             chosen.push(k);
         }
         Some((least, chosen))
     };
     let poses = generic_poses(mech);
-    let (_, chosen) = poses.iter().filter_map(best).max_by(|a, b| a.0.total_cmp(&b.0))?;
+    let (_, chosen) = poses.iter().filter_map(best).max_by(|a, b| by_size(a.0, b.0))?;
     let mut square = mech.clone();
     for (k, &number) in numbers.iter().enumerate() {
         square.legs[number].actuated = chosen.contains(&k);

@@ -11,6 +11,7 @@ use crate::model::joint::JointKind;
 use crate::model::spec::{
     ANGLE_TOLERANCE, BodySpec, Fault, JointSpec, LegSpec, LimitsSpec, SliderSpec, Spec,
 };
+use crate::number::order::{by_size, largest};
 use crate::spatial::{Mat3, Vec3};
 
 impl Spec {
@@ -324,7 +325,7 @@ fn inertia_fault(rows: &[[f64; 3]; 3]) -> Option<String> {
     if rows.iter().flatten().any(|e| !e.is_finite()) {
         return Some("holds a value that is not a finite number".into());
     }
-    let scale = rows.iter().flatten().fold(0.0_f64, |m, e| m.max(e.abs()));
+    let scale = largest(rows.iter().flatten().map(|e| e.abs()));
     let transposed = Mat3::from_rows(*rows).transpose().rows();
     let skew = rows
         .iter()
@@ -336,7 +337,7 @@ fn inertia_fault(rows: &[[f64; 3]; 3]) -> Option<String> {
     }
     let mut principal: Vec<f64> =
         nalgebra::Matrix3::from_fn(|i, j| rows[i][j]).symmetric_eigenvalues().iter().copied().collect();
-    principal.sort_by(f64::total_cmp);
+    principal.sort_by(|&a, &b| by_size(a, b));
     let shown = format!("[{:.6e}, {:.6e}, {:.6e}] kg m^2", principal[0], principal[1], principal[2]);
     if principal[0] <= 0.0 {
         return Some(format!("is not positive definite: its principal moments are {shown}"));

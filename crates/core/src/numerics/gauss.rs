@@ -63,6 +63,8 @@ pub fn solve_first<T: Real, const N: usize, const M: usize>(
         }
     }
     let (mut least, mut most) = (T::Value::lit(f64::INFINITY), T::Value::zero());
+    // NaN if a pivot is not finite, else zero.
+    let mut unknown = T::Value::zero();
     for k in (0..size).rev() {
         for x in &mut rhs {
             let mut sum = x[k];
@@ -74,8 +76,9 @@ pub fn solve_first<T: Real, const N: usize, const M: usize>(
         let pivot = m[k][k].value();
         sign = sign * pivot.signum();
         (least, most) = (least.least(pivot.abs()), most.most(pivot.abs()));
+        unknown = pivot.mul_add(T::Value::zero(), unknown);
     }
-    Solved { x: rhs, pivots: least / most, sign }
+    Solved { x: rhs, pivots: least / most + unknown, sign }
 }
 
 /// Column k of the elimination.

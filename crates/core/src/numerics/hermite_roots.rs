@@ -1,6 +1,8 @@
 //! Zeros of a function known with its derivative at some points, by cubic Hermite interpolation; also pairs
 //! of zeros and double zeros between two points of the same sign \[T34\].
 
+use crate::number::order::{by_size, larger, smaller};
+
 /// A function's value and rate at a point. The rate may be NaN where it is not known.
 #[derive(Clone, Copy, Debug)]
 pub struct Node {
@@ -61,7 +63,7 @@ const ROUNDING: f64 = 1e-13;
 fn without_noise(mut known: Vec<Node>) -> Vec<Node> {
     for i in 1..known.len() {
         let (a, b) = (known[i - 1], known[i]);
-        if a.f == 0.0 && b.f == 0.0 && a.d.abs().max(b.d.abs()) * (b.t - a.t) <= ROUNDING {
+        if a.f == 0.0 && b.f == 0.0 && larger(a.d.abs(), b.d.abs()) * (b.t - a.t) <= ROUNDING {
             known[i - 1].d = 0.0;
             known[i].d = 0.0;
         }
@@ -127,7 +129,7 @@ impl Cubic {
         let q = -(c + root.copysign(c));
         let mut inside: Vec<f64> =
             [q / (3.0 * d), b / q].into_iter().filter(|u| *u > 0.0 && *u < 1.0).collect();
-        inside.sort_by(f64::total_cmp);
+        inside.sort_by(|&a, &b| by_size(a, b));
         inside
     }
 
@@ -201,7 +203,7 @@ pub fn first_zero(
     }
     let mut stride = step;
     while from.t < reach {
-        let t = (from.t + stride).min(reach);
+        let t = smaller(from.t + stride, reach);
         let Some(to) = at(t) else {
             // The function ends within this step: go on to its end by ever smaller steps.
             stride *= 0.5;
@@ -228,15 +230,18 @@ fn zero_within(
 ) -> Option<f64> {
     let mut nodes = vec![from, to];
     let span = to.t - from.t;
-    let precision =
-        Precision { crossing: 1e-15 * to.t.abs().max(span), dip: 1e-6 * span, resolution: RESOLUTION * span };
+    let precision = Precision {
+        crossing: 1e-15 * larger(to.t.abs(), span),
+        dip: 1e-6 * span,
+        resolution: RESOLUTION * span,
+    };
     for _ in 0..ROUNDS {
         let unknown = unsettled(&nodes, &precision);
         if unknown.is_empty() {
             break;
         }
         nodes.extend(unknown.into_iter().filter_map(&mut *at));
-        nodes.sort_by(|a, b| a.t.total_cmp(&b.t));
+        nodes.sort_by(|a, b| by_size(a.t, b.t));
         nodes.dedup_by(|a, b| a.t == b.t);
     }
     let found = events(&nodes, precision.resolution);

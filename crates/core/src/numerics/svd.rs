@@ -7,6 +7,7 @@
 //! that matter here, and does not say so (`findings/nalgebra-svd.sh`: one random 7×6 matrix of rank 2 in
 //! twenty).
 
+use crate::number::order::{by_size, smaller};
 use nalgebra::{DMatrix, DVector};
 
 /// Cosine of the angle between two columns that counts as square.
@@ -40,7 +41,7 @@ impl Svd {
         (0..SWEEPS).find(|_| !sweep(&mut u, &mut v, nothing))?;
         let sizes = DVector::from_fn(n, |k, _| u.column(k).norm());
         let mut order: Vec<usize> = (0..n).collect();
-        order.sort_by(|&a, &b| sizes[b].total_cmp(&sizes[a]));
+        order.sort_by(|&a, &b| by_size(sizes[b], sizes[a]));
         // A matrix has no higher rank than rows.
         let values = DVector::from_fn(n, |k, _| if k < m.nrows() { sizes[order[k]] } else { 0.0 });
         let part = |entry: f64, of: f64| if of > 0.0 { entry / of } else { 0.0 };
@@ -63,7 +64,7 @@ fn sweep(u: &mut DMatrix<f64>, v: &mut DMatrix<f64>, nothing: f64) -> bool {
         for i in 0..j {
             let (p, q) = (u.column(i), u.column(j));
             let (a, b, product) = (p.norm_squared(), q.norm_squared(), p.dot(&q));
-            if a.min(b) <= nothing || product.abs() <= SQUARE * (a * b).sqrt() {
+            if smaller(a, b) <= nothing || product.abs() <= SQUARE * (a * b).sqrt() {
                 continue;
             }
             // The smaller rotation that makes them orthogonal: t = tan of its angle, t² + 2 ζ t = 1. What was

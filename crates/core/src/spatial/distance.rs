@@ -1,6 +1,7 @@
 //! Distances between struts, and between a strut and the platform: of segments, and of a segment and a convex
 //! body \[T37\]. All are exact, also for parallel, crossing and vanishing segments.
 
+use crate::number::order::largest;
 use crate::number::real::{Constant, Ordered, Real};
 use crate::spatial::vector::Vec3;
 
@@ -211,7 +212,7 @@ impl Hull {
     /// The hull of at least one point.
     #[must_use]
     pub fn of(points: &[Vec3<f64>]) -> Self {
-        let size = points.iter().map(|p| (*p - points[0]).norm()).fold(0.0, f64::max);
+        let size = largest(points.iter().map(|p| (*p - points[0]).norm()));
         let mut corners: Vec<Vec3<f64>> = Vec::new();
         for p in points {
             if corners.iter().all(|c| (*c - *p).norm() > POINT_TOLERANCE * size) {
@@ -310,6 +311,7 @@ fn ends(points: &[Vec3<f64>]) -> Vec<Vec3<f64>> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::number::order::smaller;
     use crate::number::real::Dual;
 
     fn v(x: f64, y: f64, z: f64) -> Vec3<f64> {
@@ -319,7 +321,7 @@ mod tests {
     /// The least distance from a segment over a fine grid of its points, each to the nearest of what `to`
     /// gives.
     fn by_search(s: &Segment<f64>, to: impl Fn(Vec3<f64>) -> f64) -> f64 {
-        (0..=4000).map(|i| to(s.at(f64::from(i) / 4000.0))).fold(f64::INFINITY, f64::min)
+        (0..=4000).map(|i| to(s.at(f64::from(i) / 4000.0))).fold(f64::INFINITY, smaller)
     }
 
     #[test]
@@ -350,7 +352,7 @@ mod tests {
                 let b = Segment(v(0.1, 0.0, h) - turned, v(0.1, 0.0, h) + turned * 0.7);
                 let found = distance(&Segment(-Vec3::X, Vec3::X), &b);
                 // Where rounding hides the crossing, an end is within the angle of the other segment.
-                assert!((found - h).abs() < 1e-15 + 1e-8_f64.min(angle), "{angle} {h}: {found}");
+                assert!((found - h).abs() < 1e-15 + smaller(1e-8, angle), "{angle} {h}: {found}");
             }
         }
     }

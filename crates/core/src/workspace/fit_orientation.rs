@@ -6,6 +6,7 @@ use crate::kinematics::constraint;
 use crate::kinematics::leg;
 use crate::model::limit::{Limit, Measure};
 use crate::model::mechanism::Mechanism;
+use crate::number::order::by_size;
 use crate::numerics::gauss::solve;
 use crate::spatial::{Acceleration, Motion, Pose, Twist, Vec3};
 
@@ -124,10 +125,10 @@ pub fn margins(mech: &Mechanism, pose: &Pose<f64>) -> Vec<f64> {
     mech.limits.iter().map(|l| l.margin(mech, pose, forces.as_deref())).collect()
 }
 
-/// The margin of the limit that is nearest relative to its scale; NaN without limits.
+/// The margin of the limit that is nearest relative to its scale; NaN without limits, or if one is unknown.
 #[must_use]
 pub fn nearest(mech: &Mechanism, margins: &[f64]) -> f64 {
     let relative = |(margin, limit): &(&f64, &Limit)| **margin / limit.scale;
-    let least = margins.iter().zip(&mech.limits).min_by(|a, b| relative(a).total_cmp(&relative(b)));
+    let least = margins.iter().zip(&mech.limits).min_by(|a, b| by_size(relative(a), relative(b)));
     least.map_or(f64::NAN, |(margin, _)| *margin)
 }

@@ -13,6 +13,7 @@ use crate::model::limit::{Bound, Measure};
 use crate::model::mechanism::Mechanism;
 use crate::model::status::Status;
 use crate::number::lanes::WIDTH;
+use crate::number::order::{larger, largest};
 use crate::spatial::{Pose, Vec3};
 use crate::workspace::lattice_poses::{Front, NONE, Reached, Slab};
 use crate::workspace::lattice_steps::{AXES, Met, Predicted, Room, Way, follow, marker, predict};
@@ -111,7 +112,7 @@ impl Lattice {
                     })
                 };
                 let (least, most) = (end(true)?, end(false)?);
-                let pieces = ((most - least) / step).round().max(1.0);
+                let pieces = larger(((most - least) / step).round(), 1.0);
                 let step = (most - least) / pieces;
                 let center =
                     ((leg::position(leg, start).coordinate - least) / step).round().clamp(0.0, pieces);
@@ -124,9 +125,9 @@ impl Lattice {
             axis.stride = size;
             size *= axis.count;
         }
-        let longest = axes.iter().map(|a| a.length(a.count)).fold(0.0, f64::max);
-        let middle = mech.legs.iter().map(|leg| leg.base.point.z).fold(0.0, f64::max);
-        let reach = longest + mech.legs.iter().map(|leg| leg.platform.point.norm()).fold(0.0, f64::max);
+        let longest = largest(axes.iter().map(|a| a.length(a.count)));
+        let middle = largest(mech.legs.iter().map(|leg| leg.base.point.z));
+        let reach = longest + largest(mech.legs.iter().map(|leg| leg.platform.point.norm()));
         let layers = (middle - reach, layer);
         let nodes = axes.first()?.stride;
         let slabs: Vec<Slab> = (0..axes[0].count).map(|i| Slab::new(i * nodes, nodes)).collect();

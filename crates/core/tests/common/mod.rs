@@ -10,6 +10,7 @@ use polypod_core::mobility::degrees_of_freedom;
 use polypod_core::model::mechanism::Mechanism;
 use polypod_core::model::spec::Spec;
 use polypod_core::model::status::Status;
+use polypod_core::number::order::larger;
 use polypod_core::number::real::Jet;
 use polypod_core::spatial::{Mat3, Motion, Pose, Vec3};
 
@@ -327,6 +328,6 @@ pub fn parts(a: Vec3<Jet<f64>>) -> [Vec3<f64>; 3] {
 
 /// Asserts that two vectors are equal to `tolerance`, relative to the larger of them and one.
 pub fn close(found: Vec3<f64>, expected: Vec3<f64>, tolerance: f64, what: &str) {
-    let error = (found - expected).norm() / expected.norm().max(1.0);
+    let error = (found - expected).norm() / larger(expected.norm(), 1.0);
     assert!(error <= tolerance, "{what}: {found:?} is not {expected:?}, off by {error:e}");
 }
