@@ -471,3 +471,16 @@ def test_drawings_are_kept_up(name: str, tmp_path: Path) -> None:
     subprocess.run([sys.executable, DOCS / "catalogue.py", name, "-o", tmp_path], check=True, timeout=120)
     grey = [np.asarray(Image.open(p).convert("L").resize((64, 64)), dtype=float) / 255 for p in (made, kept)]
     assert abs(grey[0] - grey[1]).max() < 0.15, "make gallery has not been run"
+
+
+def test_the_mathworks_stage_has_the_solids_of_its_set_up_file() -> None:
+    """Steel of 76 kN/m^3; tubes of 50 and 30 mm radius, rods of 30 mm, three quarters of a leg long each."""
+    mech = pp.load("ups-hexapod")
+    density, length = 76e3 / 9.81, 0.75 * mech.inverse_kinematics(mech.home).lengths[0]
+    section = {"cylinder": (0.05**2 - 0.03**2, 0.05**2 + 0.03**2), "piston": (0.03**2, 0.03**2)}
+    for leg in mech.to_dict()["legs"]:
+        for link, (difference, total) in section.items():
+            mass = density * length * np.pi * difference
+            across = mass * (total / 4 + length**2 / 12)
+            assert leg[link]["mass"] == pytest.approx(mass, rel=1e-12)
+            assert leg[link]["inertia"] == pytest.approx([across, mass * total / 2, across], rel=1e-12)
