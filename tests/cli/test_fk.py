@@ -241,6 +241,39 @@ def test_the_table_is_whole_in_80_columns(run, mech, path, monkeypatch):
     assert "…" not in out
 
 
+def test_the_rotation_of_six_degrees_of_freedom_is_shown_and_saved(run, path):
+    """As rx, ry, rz: six of the eight modes are tilted."""
+    mech = pp.load("ups-hexapod")
+    lengths = mech.inverse_kinematics(mech.home).lengths
+    write(path, [lengths], ("mm",) * 6, range(6), mech.leg_names)
+    result = path.with_name("poses.csv")
+    out = run("fk", "ups-hexapod", path, "-o", result)[1]
+    with result.open() as file:
+        lines = list(csv.DictReader(file))
+    modes = mech.assembly_modes(lengths)
+    assert len(lines) == modes.number
+    tilted = 0
+    for line, pose in zip(lines, modes.pose, strict=False):
+        angles = {name: float(line[f"{name} [rad]"]) for name in ("rx", "ry", "rz")}
+        again = mech.state({**dict(zip("xyz", pose[:3, 3], strict=True)), **angles}).pose
+        np.testing.assert_allclose(again, pose, atol=1e-12)
+        tilted += pose[2, 2] < 0.99
+        for angle in angles.values():
+            assert f"{np.degrees(abs(angle)):.1f}" in out
+    assert tilted
+
+
+def test_a_table_is_no_longer_than_a_screen(run, mech, path):
+    lengths = mech.inverse_kinematics(poses(mech, 30)).lengths
+    total = int(mech.assembly_modes(lengths).number.sum())
+    write(path, [*lengths, *[NOWHERE] * 50])
+    status, out, _ = run("fk", NAME, path)
+    assert status == 1
+    assert f"... and {total - 40} more, {total} poses of 80 rows in all" in out
+    assert "... and 10 more: 50 of 80 rows have no pose, and 0 may lack one." in out
+    assert len(out.splitlines()) < 90
+
+
 # --- result file --------------------------------------------------------------------------------------------
 
 

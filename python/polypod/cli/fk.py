@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.console import Console
@@ -20,6 +20,9 @@ from polypod.cli.shared import (
     print_written,
     working,
 )
+
+if TYPE_CHECKING:
+    from polypod.solution.poses_of_lengths import PosesOfLengths
 
 app = typer.Typer()
 
@@ -57,7 +60,7 @@ def fk(
     The exit status is 1 if a row has no pose, or if one of its poses may be missing.
     """
     from polypod.mechanism import load
-    from polypod.solution.poses_of_lengths import load_lengths, save_table, tabulate_continued, tabulate_modes
+    from polypod.solution.poses_of_lengths import all_modes, followed, load_lengths
 
     if result is not None:
         check_result_path(result, mechanism, str(lengths), suffixes=(".csv",))
@@ -65,49 +68,67 @@ def fk(
     sets = load_lengths(lengths, mech)
     with working("finding poses"):
         one = near or mode is not None
-        facts = tabulate_continued(mech, sets, mode) if one else tabulate_modes(mech, sets)
+        poses = followed(mech, sets, mode) if one else all_modes(mech, sets)
     if result is not None:
-        save_table(facts, mech, result)
+        poses.save(result)
     if as_json:
-        print_json(facts if result is None else {**facts, "result": str(result)})
+        print_json(poses.facts() if result is None else {**poses.facts(), "result": str(result)})
     else:
-        _print_poses(console(), facts)
+        _print_poses(console(), poses)
         if result is not None:
             print_written(result)
-    if facts["without_pose"] or facts["incomplete"]:
+    if poses.without_pose or poses.incomplete:
         raise typer.Exit(1)
 
 
-def _print_poses(out: Console, facts: dict[str, Any]) -> None:
-    """One table; narrow, so that position and status stay whole where there is room for 80 characters."""
-    from polypod.files.units import KIND_OF_COORDINATE, from_si
+MOST_POSES = 40
+"""Poses that a table shows, and rows without an answer that are told: more is no longer read on a screen."""
 
-    rows = [(row, mode) for row in facts["rows"] for mode in row["modes"]]
-    if rows:
-        coordinates = rows[0][1]["coordinates"]
-        angles = [name for name in coordinates if KIND_OF_COORDINATE[name] == "angle"]
-        headers = ["row>", "mode>", "o / mm>", *(f"{name} / deg>" for name in angles)]
-        poses = new_table(f"Poses of {escape(facts['mechanism'])}", *headers, "side", "det J", "status")
-        poses.box, poses.pad_edge, poses.collapse_padding = None, False, True
-        poses.columns[2].no_wrap, poses.columns[-1].overflow = True, "fold"
-        for row, mode in rows:
-            position = ", ".join(f"{1e3 * line[3]:.1f}" for line in mode["pose"][:3])
-            turns = [mode["coordinates"][name] for name in angles]
-            poses.add_row(
-                str(row["row"]),
-                str(mode["mode"]),
-                position,
-                *(fixed(None if turn is None else from_si(turn, "angle", "deg")) for turn in turns),
-                {True: "above", False: "below", None: ""}[mode["above"]],
-                {1: "+", 0: "0", -1: "-", None: ""}[mode["determinant_sign"]],
-                mode["status"],
+
+def _print_poses(out: Console, found: PosesOfLengths) -> None:
+    """One table; narrow, so that position and status stay whole where there is room for 80 characters."""
+    import numpy as np
+
+    from polypod.answers.status import Status
+    from polypod.files.units import from_si
+
+    total = len(found.pose)
+    if total:
+        rotation = {name: from_si(q[:MOST_POSES], "angle", "deg") for name, q in found.rotation().items()}
+        headers = ["row>", "mode>", "o / mm>", *(f"{name} / deg>" for name in rotation)]
+        table = new_table(f"Poses of {escape(found.mech.name)}", *headers, "side", "det J", "status")
+        table.box, table.pad_edge, table.collapse_padding = None, False, True
+        table.columns[2].no_wrap, table.columns[-1].overflow = True, "fold"
+        rows = found.row
+        for i in range(min(total, MOST_POSES)):
+            table.add_row(
+                str(rows[i]),
+                str(found.mode[i]),
+                ", ".join(f"{1e3 * x:.1f}" for x in found.pose[i, :3, 3]),
+                *(fixed(float(q[i]) if np.isfinite(q[i]) else None) for q in rotation.values()),
+                {1.0: "above", 0.0: "below"}.get(float(found.above[i]), ""),
+                {1.0: "+", 0.0: "0", -1.0: "-"}.get(float(found.determinant_sign[i]), ""),
+                Status(int(found.status[i])).name,
             )
-        out.print(poses)
-    for row in facts["rows"]:
-        said = []
-        if not row["modes"]:
-            said.append("no pose has these lengths" if row["status"] == "OK" else "no pose was found")
-        if row["status"] != "OK":
-            said.append(f"{row['status']}: {row['message']}")
-        if said:
-            out.print(f"Row {row['row']}: {escape('; '.join(said))}", soft_wrap=True)
+        out.print(table)
+        if total > MOST_POSES:
+            out.print(
+                f"... and {total - MOST_POSES} more, {total} poses of {len(found.number)} rows in all: "
+                "-o FILE.csv writes all, --json prints them.",
+                highlight=False,
+            )
+    told = np.flatnonzero((found.number == 0) | (found.row_status != Status.OK))
+    for row in told[:MOST_POSES].tolist():
+        status, said = Status(int(found.row_status[row])), []
+        if not found.number[row]:
+            said.append("no pose has these lengths" if status == Status.OK else "no pose was found")
+        if status != Status.OK:
+            said.append(f"{status.name}: {status.message}")
+        out.print(f"Row {row + 1}: {escape('; '.join(said))}", soft_wrap=True)
+    if len(told) > MOST_POSES:
+        out.print(
+            f"... and {len(told) - MOST_POSES} more: {found.without_pose} of {len(found.number)} rows "
+            f"have no pose, and {found.incomplete} may lack one.",
+            soft_wrap=True,
+            highlight=False,
+        )

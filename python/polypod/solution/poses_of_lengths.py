@@ -10,7 +10,9 @@ The columns stand in any order. Those of legs without actuator may be left out: 
 from __future__ import annotations
 
 import csv
+import itertools
 import math
+from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -21,7 +23,7 @@ from numpy.typing import ArrayLike, NDArray
 from polypod.answers.status import Status
 from polypod.errors import CoordinateError, Fault, LengthsError
 from polypod.files.csv_columns import columns_to_si, read_header, read_numbers, read_rows
-from polypod.files.text import read_text
+from polypod.files.text import read_text, replacing
 from polypod.files.units import KIND_OF_COORDINATE, si_unit
 from polypod.mechanism import Mechanism
 
@@ -62,56 +64,153 @@ def load_lengths(source: str | PathLike[str], mech: Mechanism) -> Array:
 # --- poses --------------------------------------------------------------------------------------------------
 
 
-def tabulate_modes(mech: Mechanism, lengths: ArrayLike) -> dict[str, Any]:
-    """All poses with each set of leg lengths (N, n), m, as plain data, SI [T28].
+@dataclass(frozen=True, eq=False)
+class PosesOfLengths:
+    """The poses of N sets of leg lengths, M in all, in the order of the sets, SI [T25-T28].
 
-    `rows` has one entry for each set, and in it `modes` one for each pose, both counted from 1.
-    `without_pose` counts the sets that have no pose, `incomplete` those where one may be missing.
+    Of poses that were followed `above` and `multiplicity` are NaN: one pose alone does not determine them.
     """
+
+    mech: Mechanism
+    row_status: NDArray[np.uint8]  # (N,), of each set
+    number: NDArray[np.int64]  # (N,), how many poses it has
+    mode: NDArray[np.int64]  # (M,), number of the pose among those of its set, from 1
+    pose: Array  # (M, 4, 4)
+    coordinates: dict[str, Array]  # (M,) each, of the first coordinate set
+    determinant_sign: Array  # (M,), of det J; NaN where it is not known
+    above: Array  # (M,), 1 on that side of the base joints where the platform is at home, else 0
+    multiplicity: Array  # (M,), poses that meet in this one
+    residual: Array  # (M,), m
+    status: NDArray[np.uint8]  # (M,), of each pose
+
+    @property
+    def row(self) -> NDArray[np.int64]:
+        """(M,): the set that each pose belongs to, from 1."""
+        return np.repeat(np.arange(1, len(self.number) + 1), self.number)
+
+    @property
+    def without_pose(self) -> int:
+        """Sets that have no pose."""
+        return int(np.sum(self.number == 0))
+
+    @property
+    def incomplete(self) -> int:
+        """Sets that have poses, of which one may be missing."""
+        return int(np.sum((self.number > 0) & (self.row_status == Status.NOT_CONVERGED)))
+
+    def rotation(self) -> dict[str, Array]:
+        """Angles of the rotation, (M,) each: those of the first coordinate set, or rx, ry, rz of `tool`."""
+        angles = {name: q for name, q in self.coordinates.items() if KIND_OF_COORDINATE[name] == "angle"}
+        if "axis_x" not in self.coordinates:
+            return angles
+        pose = self.mech.coordinates(self.pose, "pose")
+        return {name: pose[name] for name in ("rx", "ry", "rz")}
+
+    def facts(self) -> dict[str, Any]:
+        """All of it as plain data: `rows` has one entry for each set, and in it `modes` one for each pose."""
+        numbers = {
+            "mode": self.mode.tolist(),
+            "pose": self.pose.tolist(),
+            "coordinates": [
+                {name: _known(x) for name, x in zip(self.coordinates, of, strict=True)}
+                for of in zip(*(q.tolist() for q in self.coordinates.values()), strict=True)
+            ],
+            "determinant_sign": _whole(self.determinant_sign),
+            "above": [None if x is None else bool(x) for x in _whole(self.above)],
+            "multiplicity": _whole(self.multiplicity),
+            "residual": self.residual.tolist(),
+            "status": [Status(code).name for code in self.status.tolist()],
+        }
+        modes = iter([dict(zip(numbers, of, strict=True)) for of in zip(*numbers.values(), strict=True)])
+        rows = [
+            {
+                "row": row,
+                "status": Status(code).name,
+                "message": Status(code).message,
+                "modes": list(itertools.islice(modes, count)),
+            }
+            for row, (code, count) in enumerate(
+                zip(self.row_status.tolist(), self.number.tolist(), strict=True), 1
+            )
+        ]
+        return {
+            "mechanism": self.mech.name,
+            "coordinate_set": next(iter(self.mech.coordinate_sets)),
+            "rows": rows,
+            "without_pose": self.without_pose,
+            "incomplete": self.incomplete,
+        }
+
+    def save(self, path: str | PathLike[str]) -> None:
+        """Write a CSV file with one line for each pose.
+
+        The position of o, the other numbers of the coordinate set and of the rotation, SI; cells without
+        answer are empty.
+        """
+        others = {name: q for name, q in self.coordinates.items() if name not in ("x", "y", "z")}
+        others |= {name: q for name, q in self.rotation().items() if name not in others}
+        columns: dict[str, list[Any]] = {"row": self.row.tolist(), "mode": self.mode.tolist()}
+        columns |= {f"{name} [m]": self.pose[:, i, 3].tolist() for i, name in enumerate("xyz")}
+        for name, q in others.items():
+            kind = KIND_OF_COORDINATE[name]
+            columns[f"{name} [{si_unit(kind)}]" if kind else name] = [_known(x) for x in q.tolist()]
+        columns["determinant_sign"] = _whole(self.determinant_sign)
+        columns["above"], columns["multiplicity"] = _whole(self.above), _whole(self.multiplicity)
+        columns["residual [m]"] = self.residual.tolist()
+        columns["status"] = [Status(code).name for code in self.status.tolist()]
+        with replacing(Path(path)) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
+            writer = csv.writer(file, lineterminator="\n")
+            writer.writerow(columns)
+            writer.writerows(zip(*columns.values(), strict=True))
+
+
+def all_modes(mech: Mechanism, lengths: ArrayLike) -> PosesOfLengths:
+    """All poses with each set of leg lengths (N, n), m [T28]."""
     found = mech.assembly_modes(lengths)
-    coordinates = mech.coordinates(found.pose)
-    rows = []
-    for i, (number, code) in enumerate(zip(found.number.tolist(), found.status.tolist(), strict=True)):
-        modes = []
-        for j in range(number):
-            mode = _pose(found.pose[i, j], {name: q[i, j] for name, q in coordinates.items()}, j + 1)
-            mode["determinant_sign"] = int(found.determinant_sign[i, j])
-            mode["above"] = bool(found.above[i, j])
-            mode["multiplicity"] = int(found.multiplicity[i, j])
-            mode["residual"] = float(found.residual[i, j])
-            mode["status"] = Status(int(found.mode_status[i, j])).name
-            modes.append(mode)
-        rows.append(_row(i + 1, Status(code), modes))
-    return _table(mech, rows)
+    count: NDArray[np.int64] = np.asarray(found.number, dtype=np.int64)
+    known = np.arange(found.pose.shape[1]) < count[:, None]
+    pose = found.pose[known]
+    return PosesOfLengths(
+        mech,
+        row_status=found.status,
+        number=count,
+        mode=1 + np.nonzero(known)[1],
+        pose=pose,
+        coordinates=mech.coordinates(pose),
+        determinant_sign=found.determinant_sign[known].astype(float),
+        above=found.above[known].astype(float),
+        multiplicity=found.multiplicity[known].astype(float),
+        residual=found.residual[known],
+        status=found.mode_status[known],
+    )
 
 
-def tabulate_continued(mech: Mechanism, lengths: ArrayLike, mode: int | None = None) -> dict[str, Any]:
+def followed(mech: Mechanism, lengths: ArrayLike, mode: int | None = None) -> PosesOfLengths:
     """The pose with each set of leg lengths (N, n), m, followed along the rows [T25-T27].
 
-    From home, or from a mode of the first row, counted from 1 as `tabulate_modes` does. From a home that is
-    nearly singular, as the published one, few lengths are reached.
-    The form is that of `tabulate_modes`, with at most one mode in a row; the side of the base and how many
-    modes meet are None, as one pose alone does not determine them.
+    From home, or from a mode of the first row, counted from 1 as `all_modes` does. From a home that is nearly
+    singular, as the published one, few lengths are reached.
 
     Raises:
         CoordinateError: the first row has no mode of that number.
     """
     guess = None if mode is None else _mode_of_first_row(mech, np.asarray(lengths), mode)
     found = mech.forward_kinematics(lengths, guess, continued=True)
-    coordinates = mech.coordinates(found.pose)
-    sign = np.sign(mech.determinant(found.pose).determinant)
-    rows = []
-    for i, code in enumerate(found.status.tolist()):
-        modes = []
-        if np.isfinite(found.pose[i]).all():
-            pose = _pose(found.pose[i], {name: q[i] for name, q in coordinates.items()}, mode or 1)
-            pose["determinant_sign"] = int(sign[i]) if math.isfinite(sign[i]) else None
-            pose["above"] = pose["multiplicity"] = None
-            pose["residual"] = float(found.residual[i])
-            pose["status"] = Status(code).name
-            modes.append(pose)
-        rows.append(_row(i + 1, Status(code), modes))
-    return _table(mech, rows)
+    known = np.isfinite(found.pose).all(axis=(-2, -1))
+    pose, unknown = found.pose[known], np.full(int(np.sum(known)), np.nan)
+    return PosesOfLengths(
+        mech,
+        row_status=found.status,
+        number=known.astype(np.int64),
+        mode=np.full(len(pose), mode or 1),
+        pose=pose,
+        coordinates=mech.coordinates(pose),
+        determinant_sign=np.sign(mech.determinant(pose).determinant),
+        above=unknown,
+        multiplicity=unknown,
+        residual=found.residual[known],
+        status=found.status[known],
+    )
 
 
 def _mode_of_first_row(mech: Mechanism, lengths: Array, mode: int) -> Array:
@@ -123,43 +222,10 @@ def _mode_of_first_row(mech: Mechanism, lengths: Array, mode: int) -> Array:
     return pose
 
 
-def _pose(pose: Array, coordinates: dict[str, Any], number: int) -> dict[str, Any]:
-    return {
-        "mode": number,
-        "pose": pose.tolist(),
-        "coordinates": {name: float(q) if math.isfinite(q) else None for name, q in coordinates.items()},
-    }
+def _known(x: float) -> float | None:
+    return x if math.isfinite(x) else None
 
 
-def _row(number: int, status: Status, modes: list[dict[str, Any]]) -> dict[str, Any]:
-    return {"row": number, "status": status.name, "message": status.message, "modes": modes}
-
-
-def _table(mech: Mechanism, rows: list[dict[str, Any]]) -> dict[str, Any]:
-    return {
-        "mechanism": mech.name,
-        "coordinate_set": next(iter(mech.coordinate_sets)),
-        "rows": rows,
-        "without_pose": sum(not row["modes"] for row in rows),
-        "incomplete": sum(bool(row["modes"]) and row["status"] == Status.NOT_CONVERGED.name for row in rows),
-    }
-
-
-def save_table(table: dict[str, Any], mech: Mechanism, path: str | PathLike[str]) -> None:
-    """Write what `tabulate_modes` or `tabulate_continued` gives to a CSV file, one line for each mode.
-
-    The position of o, then the other numbers of the coordinate set, SI; cells without answer are empty.
-    """
-    names = [name for name in mech.coordinates(mech.home) if name not in ("x", "y", "z")]
-    plain = ("determinant_sign", "above", "multiplicity", "residual", "status")
-    headers = [f"{name} [{si_unit(kind)}]" if (kind := KIND_OF_COORDINATE[name]) else name for name in names]
-    with Path(path).open("w", encoding="utf-8", newline="") as file:
-        write = csv.writer(file, lineterminator="\n").writerow
-        named = ["residual [m]" if name == "residual" else name for name in plain]
-        write(["row", "mode", "x [m]", "y [m]", "z [m]", *headers, *named])
-        for row in table["rows"]:
-            for mode in row["modes"]:
-                position = [line[3] for line in mode["pose"][:3]]
-                rest = [mode["coordinates"][name] for name in names]
-                facts = [int(fact) if isinstance(fact := mode[name], bool) else fact for name in plain]
-                write([row["row"], mode["mode"], *position, *rest, *facts])
+def _whole(values: Array) -> list[int | None]:
+    """Whole numbers, None for NaN."""
+    return [None if math.isnan(x) else int(x) for x in values.tolist()]
