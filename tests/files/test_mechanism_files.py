@@ -40,7 +40,7 @@ BAD: dict[str, tuple[str, dict[str, Any], str, str]] = {
         "is missing; valid: rad, deg",
     ),
     "wrong unit": (PAPER, {"units__length": "N"}, "units.length", 'is "N"; valid: m, mm, cm'),
-    "wrong unit of angles": (PAPER, {"units__angle": "grad"}, "units.angle", 'is "grad"; did you mean "rad"'),
+    "wrong unit of angles": (PAPER, {"units__angle": "grad"}, "units.angle", 'is "grad"; valid: rad, deg'),
     "negative mass": (PAPER, {"platform__mass": -3.0}, "platform.mass", "is -3 kg; must be positive"),
     "no mass": (PAPER, {"legs__2__piston__mass": 0}, "legs.2.piston.mass", "is 0 kg; must be positive"),
     "indefinite inertia": (

@@ -11,7 +11,9 @@ import numpy as np
 import pytest
 import tomli_w
 from numpy.polynomial import Polynomial
+from scipy.spatial.transform import Rotation
 
+import polypod as pp
 from polypod.errors import MotionError, ShapeError, UnknownNameError
 from polypod.motion.motion import Array, Motion, minimum_jerk, quintic
 from polypod.motion.motion_file import load_motion
@@ -284,6 +286,84 @@ def test_csv_header(write: Write, old: str, new: str, expected: list[str]) -> No
     found = faults(path)
     for part in expected:
         assert any(part in fault for fault in found), found
+
+
+POSE = "time [s], x [m], y [m], z [m], rx [rad], ry [rad], rz [rad]"
+
+
+@pytest.mark.parametrize(
+    ("char", "name"), [(";", "semicolons"), ("\t", "tabs"), ("|", "bars"), (" ", "spaces")]
+)
+def test_csv_with_other_separators(write: Write, char: str, name: str) -> None:
+    """One fault, which says what stands there, and that decimal commas will not do either."""
+    header = POSE.replace(", ", char)
+    text = f"{header}\n" + "\n".join(char.join((f"{t}", *["0,5"] * 6)) for t in range(3))
+    assert faults(write("a.csv", text)) == [
+        f"line 1: has {name} between its columns; needs commas there, and points in numbers, as in 0.5, 1.25"
+    ]
+
+
+@pytest.mark.parametrize(
+    ("columns", "expected"),
+    [
+        (["roll [deg]", "pitch [deg]", "yaw [deg]"], 'from_euler("xyz", [roll, pitch, yaw]).as_euler("XYZ")'),
+        (["Roll", "Pitch", "Yaw"], "R = Rz(yaw) Ry(pitch) Rx(roll)"),
+        (["qw", "qx", "qy", "qz"], 'from_quat([x, y, z, w]).as_euler("XYZ")'),
+        (["orientation.x", "orientation.y", "orientation.z", "orientation.w"], "a quaternion"),
+    ],
+)
+def test_csv_with_other_numbers_of_a_rotation(write: Write, columns: list[str], expected: str) -> None:
+    """One fault with all of them, the order of the rotation and the way to it."""
+    header = ", ".join(["time [s]", "x [m]", "y [m]", "z [m]", *columns])
+    rows = np.zeros((3 + len(columns), 3))
+    (fault,) = faults(write("a.csv", table(np.arange(3.0), *rows, header=header)))
+    names = ", ".join(column.partition(" ")[0] for column in columns)
+    assert fault.startswith(f"line 1: {names}: ")
+    assert "a rotation is given by rx, ry, rz, of R = Rx(rx) Ry(ry) Rz(rz)" in fault
+    assert expected in fault
+    assert "did you mean" not in fault
+
+
+def test_the_ways_from_other_numbers_of_a_rotation_lead_to_the_pose() -> None:
+    """What the faults tell to do makes the same matrix."""
+    roll, pitch, yaw = 0.3, -0.5, 0.9
+    x, y, z = (
+        Rotation.from_euler(axis, angle).as_matrix()
+        for axis, angle in zip("xyz", (roll, pitch, yaw), strict=True)
+    )
+    meant = z @ y @ x
+    mech = pp.load("ups-hexapod")
+    for rotation in (
+        Rotation.from_euler("xyz", [roll, pitch, yaw]),
+        Rotation.from_quat(Rotation.from_matrix(meant).as_quat()),
+    ):
+        rx, ry, rz = rotation.as_euler("XYZ")
+        pose = mech.state({"x": 0.0, "y": 0.0, "z": 1.0, "rx": rx, "ry": ry, "rz": rz}).pose
+        np.testing.assert_allclose(pose[:3, :3], meant, atol=1e-14)
+
+
+@pytest.mark.parametrize(("unit", "seconds"), [("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9)])
+def test_csv_with_times_of_a_recorder(write: Write, unit: str, seconds: float) -> None:
+    header = HEADER.replace("[s]", f"[{unit}]")
+    text = table(np.arange(8.0), *np.ones((5, 8)), header=header)
+    assert load_motion(write("a.csv", text), SETS).time[-1] == pytest.approx(7 * seconds, rel=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "expected"),
+    [
+        ("time [s]", "time [µs]", 'has the unit "µs"; did you mean "us"? valid: s, ms, us, ns'),
+        ("time [s]", "time [seconds]", 'did you mean "s"?'),
+        ("x [mm]", "x [Millimeters]", 'did you mean "mm"?'),
+        ("beta [deg]", "beta [°]", 'did you mean "deg"?'),
+        ("beta [deg]", "beta [grad]", 'has the unit "grad"; valid: rad, deg, mrad'),
+        ("x [mm]", "x [nm]", 'has the unit "nm"; valid: m, mm, cm, um, in'),
+    ],
+)
+def test_a_unit_is_proposed_if_it_is_the_same(write: Write, old: str, new: str, expected: str) -> None:
+    """Not one that only looks alike: it would be wrong by a factor."""
+    text = table(np.arange(8.0), *np.ones((5, 8))).replace(old, new)
+    assert any(expected in fault for fault in faults(write("a.csv", text)))
 
 
 def test_csv_rows_all_faults_at_once(write: Write) -> None:

@@ -6,7 +6,7 @@ import re
 from collections.abc import Sequence
 
 from polypod.errors import WorkspaceError, alternatives
-from polypod.files.units import KIND_OF_COORDINATE, UNITS, to_si
+from polypod.files.units import KIND_OF_COORDINATE, UNITS, to_si, valid_units
 
 _KINDS = {**KIND_OF_COORDINATE, **dict.fromkeys(("azimuth", "tilt", "torsion"), "angle")}
 _EXAMPLES = {"length": "20mm", "angle": "10deg", None: "0.3"}
@@ -29,7 +29,7 @@ def quantity(place: str, text: str, kind: str | None) -> float:
     if kind is None:
         raise WorkspaceError(f"{place} is {text!r}; must be a number without a unit")
     if unit not in UNITS[kind]:
-        raise WorkspaceError(f"{place}: {unit!r} is no unit of {kind}; {alternatives(unit, UNITS[kind])}")
+        raise WorkspaceError(f"{place}: {unit!r} is no unit of {kind}; {valid_units(unit, kind)}")
     return to_si(number, kind, unit)
 
 

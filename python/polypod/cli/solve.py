@@ -87,19 +87,20 @@ def _solve_with_progress(mech: Mechanism, motion: Motion, *, reactions: bool = F
 
 def print_solution(out: Console, facts: dict[str, Any]) -> None:
     """The summary of a solution: legs, platform, power, limits, outcomes."""
+    from polypod.files.units import instant
     from polypod.summary.tables import coupled_note, motion_tables, outcome, outcomes_table
 
     out.print(
         f"[bold]{escape(facts['mechanism'])}[/bold] along [bold]{escape(facts['motion'])}[/bold] "
         f"({escape(facts['coordinate_set'])} coordinates): {facts['states']} states "
-        f"from {facts['start']:g} s to {facts['end']:g} s",
+        f"from {instant(facts['start'])} to {instant(facts['end'])}",
         highlight=False,
     )
     for table in motion_tables(facts):
         print_words(out, table)
     if note := coupled_note(facts):
         out.print(note)
-    for warning in facts["singularities"]["warnings"]:
+    for warning in (*facts["warnings"], *facts["singularities"]["warnings"]):
         out.print(f"[bold yellow]Warning:[/bold yellow] {escape(warning)}")
     if facts["outcomes"]:
         print_words(out, outcomes_table(facts))

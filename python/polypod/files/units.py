@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from typing import TypeVar
 
 import numpy as np
@@ -18,8 +19,8 @@ Value = TypeVar("Value", float, NDArray[np.float64])
 # exact, so that 270 mm becomes the very 0.27 that one would write in metres.
 UNITS: dict[str, dict[str, tuple[float, float]]] = {
     "length": {"m": (1, 1), "mm": (1, 1000), "cm": (1, 100), "um": (1, 10**6), "in": (127, 5000)},
-    "angle": {"rad": (1, 1), "deg": (math.pi, 180)},
-    "time": {"s": (1, 1), "ms": (1, 1000)},
+    "angle": {"rad": (1, 1), "deg": (math.pi, 180), "mrad": (1, 1000)},
+    "time": {"s": (1, 1), "ms": (1, 1000), "us": (1, 10**6), "ns": (1, 10**9)},
     "mass": {"kg": (1, 1), "g": (1, 1000), "lb": (45359237, 10**8)},
     "inertia": {"kg m^2": (1, 1), "kg mm^2": (1, 10**6), "g mm^2": (1, 10**9)},
     "force": {"N": (1, 1), "kN": (1000, 1), "mN": (1, 1000)},
@@ -36,6 +37,38 @@ SHOWN: dict[str, tuple[float, str]] = {
     "torque": (1.0, "N m"),
 }
 """Units that people read quantities in, and the factors to them from SI, by kind."""
+
+
+_SPELLINGS = {
+    "s": ("sec", "secs", "second", "seconds"),
+    "ms": ("msec", "millisecond", "milliseconds"),
+    "us": ("µs", "μs", "usec", "microsecond", "microseconds"),
+    "ns": ("nsec", "nanosecond", "nanoseconds"),
+    "m": ("meter", "meters", "metre", "metres"),
+    "mm": ("millimeter", "millimeters", "millimetre", "millimetres"),
+    "um": ("µm", "μm", "micron", "microns"),
+    "in": ("inch", "inches", '"'),
+    "rad": ("radian", "radians"),
+    "deg": ("°", "degree", "degrees"),
+    "N": ("newton", "newtons"),
+    "kg": ("kilogram", "kilograms"),
+}
+"""Other ways to write a unit."""
+
+
+def valid_units(unit: str, kind: str) -> str:
+    """The end of a message about an unknown unit: the same unit, if written otherwise, then all valid ones.
+
+    Units that only look alike are not proposed: a radian for a milliradian is wrong by a factor of 1000.
+    """
+
+    def plain(text: str) -> str:
+        return "".join(char for char in text.casefold() if char not in " .*·^²")
+
+    valid = UNITS[kind]
+    meant = [name for name in valid if plain(unit) in {plain(name), *map(plain, _SPELLINGS.get(name, ()))}]
+    hint = f"did you mean {shown(meant[0])}? " if len(meant) == 1 else ""
+    return f"{hint}valid: {', '.join(valid)}"
 
 
 KIND_OF_COORDINATE: dict[str, str | None] = {
@@ -75,6 +108,17 @@ def readable(value: float, unit: str) -> str:
     """A number in SI as people read it: in mm, deg, N, N m or as it is."""
     factor, name = next((shown for kind, shown in SHOWN.items() if si_unit(kind) == unit), (1.0, ""))
     return f"{factor * value:.1f} {name}" if name else f"{value:.3g}"
+
+
+UNIX_TIMES = (1e8, 1e11)
+"""Times in s that count as Unix times: from 1973 on."""
+
+
+def instant(time: float, digits: int = 6) -> str:
+    """A time as people read it, with its unit; one since 1970 as a date."""
+    if not UNIX_TIMES[0] <= time < UNIX_TIMES[1]:
+        return f"{time:.{digits}g} s"
+    return datetime.fromtimestamp(time, UTC).isoformat(" ", "milliseconds").replace("+00:00", " UTC")
 
 
 def cos_sin(angle: float, unit: str) -> tuple[float, float]:
@@ -127,10 +171,10 @@ def read_units(table: object, used: Collection[str], kinds: Collection[str]) -> 
                 Fault(place_of("units", kind), f"is no kind of quantity here; {alternatives(kind, kinds)}")
             )
         elif not isinstance(unit, str) or unit not in UNITS[kind]:
-            faults.append(Fault(f"units.{kind}", f"is {shown(unit)}; {alternatives(str(unit), UNITS[kind])}"))
+            faults.append(Fault(f"units.{kind}", f"is {shown(unit)}; {valid_units(str(unit), kind)}"))
         else:
             chosen[kind] = unit
     for kind in kinds:
         if kind in used and kind not in table:
-            faults.append(Fault(f"units.{kind}", f"is missing; {alternatives('', UNITS[kind])}"))
+            faults.append(Fault(f"units.{kind}", f"is missing; {valid_units('', kind)}"))
     return Units(chosen), faults

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Literal, Protocol
 
@@ -15,7 +15,8 @@ from scipy.interpolate import BPoly, make_interp_spline
 from polypod.answers.notebook import card, counted, numbers, rows_of
 from polypod.answers.variables import COMPONENTS, TIME, variable
 from polypod.errors import Fault, MotionError, ShapeError, shown
-from polypod.files.units import coordinate_unit
+from polypod.files.units import coordinate_unit, instant
+from polypod.motion.sample_noise import warnings_about
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -45,6 +46,8 @@ class Motion:
     wrench: Array | None = None  # (N, 6), force and torque on the platform at o; None for the mechanism's own
     wrench_axes: Axes = "base"
     curve: Curve | None = field(default=None, repr=False)
+    warnings: tuple[str, ...] = ()
+    """What is in doubt about the samples that it was made of, in sentences."""
 
     def __post_init__(self) -> None:
         names = self.coordinates.keys()
@@ -63,7 +66,7 @@ class Motion:
     def __repr__(self) -> str:
         return (
             f"<Motion {self.name}: {', '.join(self.coordinates)}; {len(self.time)} states "
-            f"from {self.time[0]:g} s to {self.time[-1]:g} s>"
+            f"from {instant(self.time[0])} to {instant(self.time[-1])}>"
         )
 
     def _repr_html_(self) -> str:
@@ -74,7 +77,7 @@ class Motion:
             for name in self.coordinates
         ]
         load = "the mechanism's own" if self.wrench is None else f"given, in {self.wrench_axes} axes"
-        said = f"{counted(len(self.time))} from {first:g} s to {last:g} s"
+        said = f"{counted(len(self.time))} from {instant(first)} to {instant(last)}"
         table = rows_of(("coordinate", "value", "rate", "unit (per s)"), rows)
         return card(f"Motion {self.name}", said, [table], notes=[f"set {self.set}; load: {load}"])
 
@@ -105,15 +108,21 @@ class Motion:
         *,
         set: str,
         name: str = "motion",
+        places: Sequence[str] | None = None,
         **more: Any,
     ) -> Motion:
-        """The motion through samples at `time`, by the quintic spline of `spline_through`; SI."""
+        """The motion through samples at `time`, by the quintic spline of `spline_through`; SI.
+
+        `places` name the samples in `warnings`: by default "sample 1", "sample 2" and so on.
+        """
         t = np.asarray(time, dtype=float)
         q = {coordinate: np.asarray(values, dtype=float) for coordinate, values in coordinates.items()}
         _check(name, t, q)
         if len(t) < 2:
             raise MotionError([Fault("time", f"has too few samples, {len(t)}; needs two or more")], name)
-        return cls.along(spline_through(t, _columns_of(q)), t, tuple(q), set=set, name=name, **more)
+        made = cls.along(spline_through(t, _columns_of(q)), t, tuple(q), set=set, name=name, **more)
+        named = places or [f"sample {i}" for i in range(1, len(t) + 1)]
+        return replace(made, warnings=tuple(warnings_about(t, q, made.second_rates, named)))
 
     @classmethod
     def along(cls, curve: Curve, time: Array, names: tuple[str, ...], **more: Any) -> Motion:
@@ -138,7 +147,13 @@ class Motion:
         curve = self.curve or _quintics(self.time, *known)
         moved = Motion.along(curve, t, tuple(self.coordinates), name=self.name, set=self.set)
         wrench = None if self.wrench is None else linear(t, self.time, self.wrench)
-        return replace(moved, branch=self.branch, wrench=wrench, wrench_axes=self.wrench_axes)
+        return replace(
+            moved,
+            branch=self.branch,
+            wrench=wrench,
+            wrench_axes=self.wrench_axes,
+            warnings=self.warnings,
+        )
 
 
 def _check(name: str, time: Array, values: Mapping[str, Array]) -> None:

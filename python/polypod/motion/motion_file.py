@@ -25,7 +25,8 @@ A TOML file gives keyframes and the curve through them:
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+import re
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from importlib import resources
 from importlib.resources.abc import Traversable
@@ -38,7 +39,14 @@ from annotated_types import Ge
 from pydantic import Strict, create_model
 
 from polypod.errors import Fault, MotionError, UnknownNameError, alternatives, shown
-from polypod.files.csv_columns import Column, columns_to_si, read_header, read_numbers, read_rows
+from polypod.files.csv_columns import (
+    Column,
+    columns_to_si,
+    name_of,
+    read_header,
+    read_numbers,
+    read_rows,
+)
 from polypod.files.tables import Number, Table, Vector, read_table
 from polypod.files.text import read_text
 from polypod.files.toml_lines import read_toml
@@ -146,7 +154,7 @@ def _read_csv(text: str, source: str, mech: HasCoordinateSets | CoordinateSets) 
         raise MotionError([Fault("file", message)], source)
     (place, header), *body = rows
     faults: list[Fault] = []
-    sets = _sets(mech, [cell.partition("[")[0].strip() for cell in header])
+    sets = _sets(mech, map(name_of, header))
     columns = _columns(header, place, sets, faults)
     samples = _samples(body, columns, faults)
     if faults:
@@ -158,18 +166,25 @@ def _read_csv(text: str, source: str, mech: HasCoordinateSets | CoordinateSets) 
         zero = np.zeros(len(samples))
         wrench = np.stack([by_name.get(component, zero) for component in KIND_OF_WRENCH], axis=-1)
     q = {name: by_name[name] for name in sets[chosen]}
-    return Motion.through(by_name["time"], q, set=chosen, name=Path(source).stem, wrench=wrench)
+    places = [place for place, _ in body]
+    return Motion.through(
+        by_name["time"], q, set=chosen, name=Path(source).stem, places=places, wrench=wrench
+    )
 
 
 def _columns(header: list[str], place: str, sets: CoordinateSets, faults: list[Fault]) -> list[Column | None]:
     """The columns that a header names, None for an unknown one."""
     coordinates = {name: KIND_OF_COORDINATE[name] for names in sets.values() for name in names}
     kinds = {"time": "time"} | coordinates | KIND_OF_WRENCH
-    columns = read_header(header, place, kinds, faults)
+    rotations = _other_rotations([name for name in map(name_of, header) if name not in kinds])
+    faults += [Fault(place, message) for message in rotations.values()]
+    told = {name for names in rotations for name in names}
+    columns = read_header(header, place, kinds, faults, told)
     named = dict.fromkeys(column.name for column in columns if column)
     if "time" not in named:
         faults.append(Fault(place, "there is no column time [s]"))
-    given = named.keys() & coordinates.keys()
+    # What is to be given in place of another rotation has been said.
+    given = (named.keys() | set(ROTATION if told else ())) & coordinates.keys()
     chosen = _nearest_set(given, sets)
     lacking = [name for name in sets[chosen] if name not in given]
     beside = [name for name in named if name in given and name not in sets[chosen]]
@@ -180,6 +195,33 @@ def _columns(header: list[str], place: str, sets: CoordinateSets, faults: list[F
         )
         faults.append(Fault(place, message + ", ".join(found)))
     return columns
+
+
+ROTATION = ("rx", "ry", "rz")
+"""Coordinates that a rotation is given in: R = Rx(rx) Ry(ry) Rz(rz) [T22]."""
+
+_ROLL_PITCH_YAW = re.compile(r"(?i)(roll|pitch|yaw)(_?angle)?")
+_QUATERNION = re.compile(r"(?i)(q|quat|quaternion|orientation)[._]?([wxyzijkrs]|[0-4])")
+
+
+def _other_rotations(names: Sequence[str]) -> dict[tuple[str, ...], str]:
+    """Names of columns that are other numbers of a rotation, and what to give in their place."""
+    needed = "a rotation is given by rx, ry, rz, of R = Rx(rx) Ry(ry) Rz(rz)"
+    angles = tuple(name for name in names if _ROLL_PITCH_YAW.fullmatch(name))
+    parts = tuple(name for name in names if _QUATERNION.fullmatch(name))
+    told = {}
+    if angles:
+        told[angles] = (
+            f"{', '.join(angles)}: {needed}; roll, pitch and yaw are mostly the angles of "
+            "R = Rz(yaw) Ry(pitch) Rx(roll): with SciPy, "
+            'Rotation.from_euler("xyz", [roll, pitch, yaw]).as_euler("XYZ") makes rx, ry, rz of them'
+        )
+    if parts:
+        told[parts] = (
+            f"{', '.join(parts)}: a quaternion; {needed}: with SciPy, "
+            'Rotation.from_quat([x, y, z, w]).as_euler("XYZ") makes them of it'
+        )
+    return told
 
 
 def _samples(body: list[tuple[str, list[str]]], columns: list[Column | None], faults: list[Fault]) -> Array:

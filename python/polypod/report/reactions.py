@@ -11,7 +11,7 @@ from polypod.answers.parts import Joint
 from polypod.mechanism import Mechanism
 from polypod.solution.solution import Solution
 from polypod.solution.solve import CHUNK
-from polypod.summary.tables import Table, fixed
+from polypod.summary.tables import Table, clock, fixed
 
 Array = NDArray[np.float64]
 
@@ -68,7 +68,7 @@ def _peak(time: Array, values: Array) -> tuple[str, str]:
     if not np.isfinite(values).any():
         return "none", ""
     at = int(np.nanargmax(values))
-    return fixed(float(values[at])), f"{time[at]:g}"
+    return fixed(float(values[at])), clock(float(time[at]))
 
 
 def families(found: Reactions) -> list[tuple[str, list[int]]]:

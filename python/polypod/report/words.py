@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from polypod.answers import leg_words
-from polypod.files.units import coordinate_unit, readable
+from polypod.files.units import coordinate_unit, instant, readable
 from polypod.legs.drives import kinds_among
 from polypod.mechanism import Mechanism
 from polypod.report.content import Along, Content
@@ -18,10 +18,12 @@ def warnings(content: Content) -> list[str]:
     if content.along is None:
         return found
     facts = content.along.facts
-    found += [_sentence(warning) for warning in facts["singularities"]["warnings"]]
+    said = (*facts["warnings"], *facts["singularities"]["warnings"])
+    found += [_sentence(warning) for warning in said]
     found += [
         f"Limit passed: {row['limit']} at {row['states']} of {facts['states']} states, first at "
-        f"{row['first_time']:g} s, by {readable(-row['margin'], row['unit'])} at most, at {row['time']:g} s."
+        f"{instant(row['first_time'])}, by {readable(-row['margin'], row['unit'])} at most, at "
+        f"{instant(row['time'])}."
         for row in (facts["limits"] or {"passed": []})["passed"]
     ]
     return found + lost(facts)
@@ -30,8 +32,8 @@ def warnings(content: Content) -> list[str]:
 def lost(facts: dict[str, Any]) -> list[str]:
     """A sentence for each outcome other than OK."""
     return [
-        f"{row['count']} of {facts['states']} states are {row['status']}, first at {row['first_time']:g} s: "
-        f"{row['message']}."
+        f"{row['count']} of {facts['states']} states are {row['status']}, first at "
+        f"{instant(row['first_time'])}: {row['message']}."
         for row in facts["outcomes"]
     ]
 

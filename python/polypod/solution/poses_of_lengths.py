@@ -196,7 +196,7 @@ def followed(mech: Mechanism, lengths: ArrayLike, mode: int | None = None) -> Po
     """
     guess = None if mode is None else _mode_of_first_row(mech, np.asarray(lengths), mode)
     found = mech.forward_kinematics(lengths, guess, continued=True)
-    known = np.isfinite(found.pose).all(axis=(-2, -1))
+    known: NDArray[np.bool_] = np.asarray(np.isfinite(found.pose).all(axis=(-2, -1)))
     pose, unknown = found.pose[known], np.full(int(np.sum(known)), np.nan)
     return PosesOfLengths(
         mech,

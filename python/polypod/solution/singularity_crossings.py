@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 
 from polypod import _core
 from polypod.answers.singularity import NEAR_SINGULAR, Determinant, SingularityKind
+from polypod.files.units import instant
 from polypod.mechanism import Mechanism
 from polypod.motion.motion import Motion
 
@@ -211,20 +212,22 @@ def warnings_of(findings: dict[str, Any]) -> list[str]:
         if not crossing["found"]:
             start, end = crossing["between"]
             notes.append(
-                f"det J has another sign at {end:g} s than at {start:g} s, and no singular pose is known in "
-                "between: the states have a gap or a jump there."
+                f"det J has another sign at {instant(end)} than at {instant(start)}, and no singular pose "
+                "is known in between: the states have a gap or a jump there."
             )
             continue
         verb = "crosses" if crossing["crosses"] else "touches"
-        notes.append(f"the motion {verb} a singular pose at {crossing['time']:.9g} s{_meaning(crossing)}")
+        notes.append(
+            f"the motion {verb} a singular pose at {instant(crossing['time'], 9)}{_meaning(crossing)}"
+        )
     for passage in findings["near"]:
         when = (
-            f"from {passage['start']:.6g} s to {passage['end']:.6g} s"
+            f"from {instant(passage['start'])} to {instant(passage['end'])}"
             if passage["end"] > passage["start"]
-            else f"at {passage['start']:.6g} s"
+            else f"at {instant(passage['start'])}"
         )
         notes.append(
-            f"the motion is near a singular pose {when}, nearest at {passage['time']:.6g} s with "
+            f"the motion is near a singular pose {when}, nearest at {instant(passage['time'])} with "
             f"{passage['minimum']:.2g} (near is below {findings['threshold']:g}){_meaning(passage)}"
         )
     return notes

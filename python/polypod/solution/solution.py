@@ -18,6 +18,7 @@ from polypod.answers.notebook import Rows, card, counted, numbers, outcomes, row
 from polypod.answers.status import Status
 from polypod.errors import Fault, SolutionError
 from polypod.files.text import read_text, replacing
+from polypod.files.units import instant
 from polypod.solution.singularity_crossings import warnings_of
 
 _FORMAT = "polypod solution 1"
@@ -48,9 +49,9 @@ class Solution:
         """Outcomes, legs, power and conditioning; how a simulation ended; singularities that are passed."""
         data, notes = self.dataset, []
         if self.end:
-            notes.append(f"ended at {self.end['time']:.6g} s: {self.end['reason']}")
+            notes.append(f"ended at {instant(self.end['time'])}: {self.end['reason']}")
         if "singularities" in data.attrs:
-            notes += [f"⚠ {text}" for text in warnings_of(self.singularities)]
+            notes += [f"⚠ {text}" for text in (*self.warnings, *warnings_of(self.singularities))]
         tables: list[Rows] = []
         legs = [name for name in OF_LEGS if name in data and data[name].dims == ("time", "leg")]
         if legs:
@@ -69,7 +70,7 @@ class Solution:
         said = []
         if "time" in data and data.sizes["time"]:
             first, last = data["time"].to_numpy()[[0, -1]].tolist()
-            said.append(f"{counted(data.sizes['time'])} from {first:g} s to {last:g} s")
+            said.append(f"{counted(data.sizes['time'])} from {instant(first)} to {instant(last)}")
         if "status" in data:
             said.append(outcomes(data["status"], Status))
         return f"Solution: {data.attrs.get('title', '')}".removesuffix(": "), ": ".join(said)
@@ -83,6 +84,12 @@ class Solution:
         """Singular poses that the motion crosses, touches or comes near, see `singularity_crossings`."""
         findings: dict[str, Any] = json.loads(self.dataset.attrs["singularities"])
         return findings
+
+    @property
+    def warnings(self) -> list[str]:
+        """Sentences for the user about the motion: its samples, its way from home, forces that are zero."""
+        found: list[str] = json.loads(self.dataset.attrs.get("warnings", "[]"))
+        return found
 
     @property
     def end(self) -> dict[str, Any] | None:

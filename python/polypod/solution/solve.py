@@ -20,6 +20,7 @@ from polypod.answers.variables import TIME, attributes_of, coords_of, variable
 from polypod.answers.variables import VARIABLES as VARIABLES
 from polypod.mechanism import Mechanism
 from polypod.motion.motion import Motion
+from polypod.solution.motion_plausibility import warnings_about
 from polypod.solution.singularity_crossings import find_passages
 from polypod.solution.solution import Solution
 
@@ -81,7 +82,12 @@ def solve(
         "wrench_axes": mech.geometry["load"]["axes"] if motion.wrench is None else motion.wrench_axes,
     }
     dataset = dataset_of(mech, motion.time, values, attrs)
-    return Solution(dataset.assign_attrs(singularities=json.dumps(passages, ensure_ascii=False)))
+    return Solution(
+        dataset.assign_attrs(
+            singularities=json.dumps(passages, ensure_ascii=False),
+            warnings=json.dumps(warnings_about(mech, motion, state.pose), ensure_ascii=False),
+        )
+    )
 
 
 def states_along(mech: Mechanism, motion: Motion) -> State:

@@ -67,6 +67,7 @@ def summarise(mech: Mechanism, solution: Solution) -> dict[str, Any]:
             "sigma_min": number(sigma[nearest]),
             "condition": number(of("condition")[nearest]),
         },
+        "warnings": solution.warnings,
         "singularities": {**solution.singularities, "warnings": warnings_of(solution.singularities)},
         "power": _power(solution),
         "coupled": _coupled(solution),

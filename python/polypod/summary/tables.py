@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from polypod.answers.leg_words import factor, force_unit, unit, word
-from polypod.files.units import coordinate_unit, readable
+from polypod.files.units import coordinate_unit, instant, readable
 from polypod.legs.drive import Drive
 from polypod.legs.drives import drive_of_letters
 
@@ -309,7 +309,7 @@ def peaks_table(facts: Facts) -> Table:
     ]
     if nearest := facts["nearest_to_singular"]:
         rows += [
-            ("nearest to singular: time / s", f"{nearest['time']:g}"),
+            ("nearest to singular: time / s", clock(nearest["time"])),
             ("... smallest singular value", significant(nearest["sigma_min"])),
             ("... condition number", significant(nearest["condition"])),
         ]
@@ -338,7 +338,7 @@ def _least_slack_rows(least: Facts | None) -> list[tuple[str, ...]]:
         ("least slack: limit", least["limit"]),
         ("... slack", readable(least["margin"], least["unit"])),
         ("... relative to the limit's scale", significant(least["relative"])),
-        ("... time / s", f"{least['time']:g}"),
+        ("... time / s", clock(least["time"])),
     ]
 
 
@@ -348,9 +348,9 @@ def passed_table(facts: Facts) -> Table:
         (
             row["limit"],
             str(row["states"]),
-            f"{row['first_time']:g}",
+            clock(row["first_time"]),
             readable(-row["margin"], row["unit"]),
-            f"{row['time']:g}",
+            clock(row["time"]),
         )
         for row in (facts["limits"] or {"passed": []})["passed"]
     ]
@@ -361,10 +361,15 @@ def passed_table(facts: Facts) -> Table:
 def outcomes_table(facts: Facts) -> Table:
     """Table of the states that are not OK."""
     rows = [
-        (row["status"], str(row["count"]), f"{row['first_time']:g}", row["message"])
+        (row["status"], str(row["count"]), clock(row["first_time"]), row["message"])
         for row in facts["outcomes"]
     ]
     return Table("Outcomes other than OK", ("status", "states>", "first at / s>", "meaning"), rows)
+
+
+def clock(time: float) -> str:
+    """A time in a column of seconds; one since 1970 as a date."""
+    return instant(time).removesuffix(" s")
 
 
 def outcome(facts: Facts) -> str:
