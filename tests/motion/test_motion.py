@@ -288,6 +288,20 @@ def test_csv_header(write: Write, old: str, new: str, expected: list[str]) -> No
         assert any(part in fault for fault in found), found
 
 
+def test_csv_of_numbers_alone_is_that_read_cell_by_cell(write: Write) -> None:
+    """A comment among the rows makes every cell be looked at: the numbers are the same bits."""
+    generator = np.random.default_rng(7)
+    text = table(
+        np.arange(50.0), *(generator.normal(size=(5, 50)) * 10.0 ** generator.integers(-9, 9, (5, 50)))
+    )
+    lines = text.splitlines()
+    by_cell = "\n".join([*lines[:20], "# a comment", *lines[20:]])
+    found = [load_motion(write("a.csv", t), SETS).curve.c for t in (text, by_cell)]  # type: ignore[union-attr]
+    assert np.array_equal(*found)
+    lines[30] = lines[30].replace(lines[30].split(",")[0], "5")
+    assert faults(write("a.csv", "\n".join(lines))) == ["line 31: time is 5.0 after 28.0; it must increase"]
+
+
 POSE = "time [s], x [m], y [m], z [m], rx [rad], ry [rad], rz [rad]"
 
 

@@ -51,7 +51,7 @@ def test_two_samples_at_almost_the_same_time():
     motion = through(time, np.insert(height(TIME), 50, height(TIME)[49]))
     assert peak(motion) > 5 * PEAK
     (warning,) = motion.warnings
-    assert "two samples there are 0.01 ms apart, with steps of 20 ms elsewhere" in warning
+    assert "because line 51 and line 52 are 0.01 ms apart, with steps of 20 ms elsewhere" in warning
     assert "near line 5" in warning
 
 

@@ -11,7 +11,8 @@ import re
 from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 from contextlib import suppress
-from typing import NamedTuple
+from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +21,6 @@ from polypod.errors import Fault, alternatives, shown
 from polypod.files.units import UNITS, to_si, valid_units
 
 Array = NDArray[np.float64]
-Row = tuple[str, list[str]]  # place, cells
 
 
 class Column(NamedTuple):
@@ -31,17 +31,74 @@ class Column(NamedTuple):
     unit: str
 
 
-def read_rows(text: str) -> list[Row] | Fault:
-    """The lines that are neither empty nor comments, the header first; or what keeps them from being read."""
-    reader = csv.reader(text.splitlines(), skipinitialspace=True)
+@dataclass(frozen=True)
+class CsvTable:
+    """A header and the lines below it, those that are neither empty nor comments."""
+
+    place: str
+    """Of the header."""
+    header: list[str]
+    places: Sequence[str]
+    """Of the lines below."""
+    cells: list[list[str]] | None
+    """Of the lines below; None where these are numbers alone."""
+    numbers: Array | None
+    """(rows, columns), the numbers as they stand there, if all cells are finite ones."""
+
+
+class LineNumbers(Sequence[str]):
+    """The places "line k", "line k + 1" and so on."""
+
+    def __init__(self, first: int, count: int) -> None:
+        self._lines = range(first, first + count)
+
+    def __len__(self) -> int:
+        return len(self._lines)
+
+    def __getitem__(self, index: Any) -> Any:
+        line = self._lines[index]
+        return [f"line {k}" for k in line] if isinstance(line, range) else f"line {line}"
+
+
+def read_rows(text: str) -> CsvTable | Fault | None:
+    """The table of a CSV file, or what keeps it from being read; None if there is no header."""
+    lines = text.splitlines()
+    reader = csv.reader(lines, skipinitialspace=True)
     try:
-        rows = [(f"line {reader.line_num}", [cell.strip() for cell in row]) for row in reader]
+        header = next(filter(_counts, map(_stripped, reader)), None)
+        if header is None:
+            return None
+        place, first = f"line {reader.line_num}", reader.line_num
+        if separator := _other_separator(header):
+            return Fault(place, f"has {separator} between its columns; {_SEPARATED}")
+        if (numbers := _numbers_alone(lines[first:], len(header))) is not None:
+            return CsvTable(place, header, LineNumbers(first + 1, len(numbers)), None, numbers)
+        rows = [(f"line {reader.line_num}", row) for row in map(_stripped, reader) if _counts(row)]
     except csv.Error as error:
         return Fault(f"line {reader.line_num}", f"is no row of a CSV file: {error}")
-    rows = [(place, row) for place, row in rows if any(row) and not row[0].startswith("#")]
-    if rows and (separator := _other_separator(rows[0][1])):
-        return Fault(rows[0][0], f"has {separator} between its columns; {_SEPARATED}")
-    return rows
+    return CsvTable(place, header, [place for place, _ in rows], [row for _, row in rows], None)
+
+
+def _stripped(row: list[str]) -> list[str]:
+    return [cell.strip() for cell in row]
+
+
+def _counts(row: list[str]) -> bool:
+    return any(row) and not row[0].startswith("#")
+
+
+def _numbers_alone(lines: list[str], width: int) -> Array | None:
+    """The numbers of lines that hold nothing else, by the parser of numpy; None for any other lines."""
+    while lines and not lines[-1].strip():
+        lines.pop()
+    if not lines:
+        return None
+    try:
+        numbers: Array = np.loadtxt(lines, delimiter=",", comments=None, ndmin=2)
+    except ValueError:
+        return None
+    whole = numbers.shape == (len(lines), width) and np.isfinite(numbers).all()
+    return numbers if whole else None
 
 
 _SEPARATED = "needs commas there, and points in numbers, as in 0.5, 1.25"
@@ -102,10 +159,13 @@ def _column(cell: str, kinds: Mapping[str, str | None]) -> tuple[Column | None, 
     return Column(name, None, ""), f"{problem}; {valid_units(unit, kind) if kind else 'it needs none'}"
 
 
-def read_numbers(body: list[Row], columns: Sequence[Column | None], faults: list[Fault]) -> Array:
+def read_numbers(table: CsvTable, columns: Sequence[Column | None], faults: list[Fault]) -> Array:
     """The numbers below the header as they stand there, (rows, columns); NaN where there is a fault."""
-    numbers = np.full((len(body), len(columns)), np.nan)
-    for numbers_of_row, (place, row) in zip(numbers, body, strict=True):
+    if table.numbers is not None:
+        return table.numbers
+    rows = table.cells or []
+    numbers = np.full((len(rows), len(columns)), np.nan)
+    for numbers_of_row, place, row in zip(numbers, table.places, rows, strict=True):
         if len(row) != len(columns):
             faults.append(Fault(place, f"has {len(row)} cells; the header has {len(columns)}"))
             continue

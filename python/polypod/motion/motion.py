@@ -121,7 +121,7 @@ class Motion:
         if len(t) < 2:
             raise MotionError([Fault("time", f"has too few samples, {len(t)}; needs two or more")], name)
         made = cls.along(spline_through(t, _columns_of(q)), t, tuple(q), set=set, name=name, **more)
-        named = places or [f"sample {i}" for i in range(1, len(t) + 1)]
+        named = [f"sample {i}" for i in range(1, len(t) + 1)] if places is None else places
         return replace(made, warnings=tuple(warnings_about(t, q, made.second_rates, named)))
 
     @classmethod
@@ -167,7 +167,7 @@ def _check(name: str, time: Array, values: Mapping[str, Array]) -> None:
         for key, array in arrays.items()
         if not np.isfinite(array).all()
     ]
-    faults += not_increasing(itertools.repeat("time"), time.tolist())
+    faults += not_increasing(itertools.repeat("time"), time)
     if faults:
         raise MotionError(faults, name)
 
@@ -176,10 +176,13 @@ def _columns_of(values: Mapping[str, Array]) -> Array:
     return np.stack(list(values.values()), axis=-1)
 
 
-def not_increasing(places: Iterable[str], times: Iterable[float]) -> list[Fault]:
-    """Faults of times that do not increase, each at its place."""
+def not_increasing(places: Iterable[str], times: ArrayLike) -> list[Fault]:
+    """Faults of times (N,) that do not increase, each at its place."""
+    given = np.asarray(times, dtype=float)
+    if np.all(np.diff(given) > 0.0):
+        return []
     faults, before = [], -math.inf
-    for place, time in zip(places, times, strict=False):
+    for place, time in zip(places, given.tolist(), strict=False):
         if time <= before:
             faults.append(Fault(place, f"time is {time} after {before}; it must increase"))
         if math.isfinite(time):

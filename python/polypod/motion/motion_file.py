@@ -41,6 +41,7 @@ from pydantic import Strict, create_model
 from polypod.errors import Fault, MotionError, UnknownNameError, alternatives, shown
 from polypod.files.csv_columns import (
     Column,
+    CsvTable,
     columns_to_si,
     name_of,
     read_header,
@@ -146,17 +147,16 @@ def _nearest_set(names: Iterable[str], sets: CoordinateSets) -> str:
 
 
 def _read_csv(text: str, source: str, mech: HasCoordinateSets | CoordinateSets) -> Motion:
-    rows = read_rows(text)
-    if isinstance(rows, Fault):
-        raise MotionError([rows], source)
-    if not rows:
+    table = read_rows(text)
+    if isinstance(table, Fault):
+        raise MotionError([table], source)
+    if table is None:
         message = "is empty; needs a header such as time [s], x [mm], ... and two samples or more"
         raise MotionError([Fault("file", message)], source)
-    (place, header), *body = rows
     faults: list[Fault] = []
-    sets = _sets(mech, map(name_of, header))
-    columns = _columns(header, place, sets, faults)
-    samples = _samples(body, columns, faults)
+    sets = _sets(mech, map(name_of, table.header))
+    columns = _columns(table.header, table.place, sets, faults)
+    samples = _samples(table, columns, faults)
     if faults:
         raise MotionError(faults, source)
     by_name = {column.name: samples[:, i] for i, column in enumerate(columns) if column}
@@ -166,9 +166,8 @@ def _read_csv(text: str, source: str, mech: HasCoordinateSets | CoordinateSets) 
         zero = np.zeros(len(samples))
         wrench = np.stack([by_name.get(component, zero) for component in KIND_OF_WRENCH], axis=-1)
     q = {name: by_name[name] for name in sets[chosen]}
-    places = [place for place, _ in body]
     return Motion.through(
-        by_name["time"], q, set=chosen, name=Path(source).stem, places=places, wrench=wrench
+        by_name["time"], q, set=chosen, name=Path(source).stem, places=table.places, wrench=wrench
     )
 
 
@@ -224,14 +223,14 @@ def _other_rotations(names: Sequence[str]) -> dict[tuple[str, ...], str]:
     return told
 
 
-def _samples(body: list[tuple[str, list[str]]], columns: list[Column | None], faults: list[Fault]) -> Array:
+def _samples(table: CsvTable, columns: list[Column | None], faults: list[Fault]) -> Array:
     """The numbers below the header, SI, (N, columns); NaN where there is a fault."""
-    samples = read_numbers(body, columns, faults)
-    if len(body) < 2:
-        faults.append(Fault("file", f"has too few samples, {len(body)}; needs two or more"))
+    samples = read_numbers(table, columns, faults)
+    if len(samples) < 2:
+        faults.append(Fault("file", f"has too few samples, {len(samples)}; needs two or more"))
     for i, column in enumerate(columns):
         if column and column.name == "time":
-            faults += not_increasing([place for place, _ in body], samples[:, i].tolist())
+            faults += not_increasing(table.places, samples[:, i])
     return columns_to_si(samples, columns)
 
 

@@ -29,6 +29,12 @@ SHARE = 0.2
 """Of the peak second derivative: an error above it is worth a warning."""
 SHORT, LONG = 0.2, 5.0
 """Steps below and above these multiples of the median step are irregular."""
+WINDOW = 24
+"""Samples on both sides that a second derivative of the spline depends on, by far."""
+BESIDE = 8
+"""Samples on both sides whose second derivatives are looked at."""
+PART = 20_000
+"""Samples whose weights are worked out at a time."""
 MEDIAN = 0.6745
 """Median of the sizes of normally distributed errors with a standard deviation of one."""
 CHANGES = 5
@@ -65,11 +71,9 @@ def warnings_about(
             "values are held between changes. Accelerations of the curve through them, and forces that "
             "follow, are those of the holding, not of the motion: take only the samples that change."
         ]
-    found = []
-    for name, values in coordinates.items():
-        doubt = _doubt(name, time, values, second_rates[name])
-        if doubt is not None:
-            found.append(doubt)
+    weights = _weights(time)
+    doubts = [_doubt(name, time, q, second_rates[name], weights, places) for name, q in coordinates.items()]
+    found = [doubt for doubt in doubts if doubt is not None]
     if not found:
         return []
     worst = max(found, key=lambda doubt: doubt.error / doubt.peak)
@@ -94,52 +98,80 @@ def _held(coordinates: dict[str, Array]) -> tuple[int, int]:
     return int(np.sum(~changes)), 1 + int(np.argmin(changes))
 
 
-def _doubt(name: str, time: Array, values: Array, second_rate: Array) -> Doubt | None:
-    errors = _departures(time, values)
+def _doubt(
+    name: str,
+    time: Array,
+    values: Array,
+    second_rate: Array,
+    weights: Array,
+    places: Sequence[str],
+) -> Doubt | None:
+    errors = _departures(values, weights)
     if not errors.any():
         return None
-    signs = np.random.default_rng(0).normal(size=(len(time), DRAWS))
-    spline = make_interp_spline(time, errors[:, None] * signs, k=5)
-    doubt = np.sqrt(np.mean(spline(time, 2) ** 2, axis=1))
-    # At its ends a spline is the least certain, whatever the samples.
-    inside = slice(3, -3)
-    sample = 3 + int(np.argmax(doubt[inside]))
-    peak = float(np.max(np.abs(second_rate[inside])))
-    if not doubt[sample] > SHARE * peak:
+    # Where an error of this size over the shorter step beside it weighs most. At its ends a spline is the
+    # least certain, whatever the samples.
+    steps = np.diff(time)
+    weight = errors[1:-1] / np.minimum(steps[:-1], steps[1:]) ** 2
+    worst = 3 + int(np.argmax(weight[2:-2]))
+    near = slice(max(worst - WINDOW, 0), worst + WINDOW + 1)
+    draws = np.random.default_rng(0).normal(size=(len(time[near]), DRAWS))
+    spline = make_interp_spline(time[near], errors[near, None] * draws, k=5)
+    beside = np.arange(max(worst - BESIDE, 3), min(worst + BESIDE + 1, len(time) - 3))
+    uncertain = np.sqrt(np.mean(spline(time[beside], 2) ** 2, axis=1))
+    sample, error = int(beside[np.argmax(uncertain)]), float(np.max(uncertain))
+    peak = float(np.max(np.abs(second_rate[3:-3])))
+    if not error > SHARE * peak:
         return None
-    return Doubt(name, sample, float(doubt[sample]), peak, _cause(name, time, values, sample))
+    return Doubt(name, sample, error, peak, _cause(name, time, values, sample, errors, places))
 
 
-def _departures(time: Array, values: Array) -> Array:
+def _weights(time: Array) -> Array:
+    """Lagrange's weights (N, 6) of the samples around each, or around the fourth and the last but three."""
+    parts = [_weights_of(time, *part) for part in _parts(len(time))]
+    return np.concatenate(parts)
+
+
+def _parts(count: int) -> list[tuple[int, int]]:
+    return [(first, min(first + PART, count)) for first in range(0, count, PART)]
+
+
+def _weights_of(time: Array, first: int, last: int) -> Array:
+    middle = np.clip(np.arange(first, last), 3, len(time) - 4)
+    t = time[middle[:, None] + AROUND] - time[middle][:, None]
+    # The product of t_j / (t_j - t_i) over the others.
+    between = t[:, None, :] - t[:, :, None]
+    factors = np.where(np.eye(len(AROUND), dtype=bool), 1.0, t[:, None, :] / np.where(between, between, 1.0))
+    weights: Array = np.prod(factors, axis=2)
+    return weights
+
+
+def _departures(values: Array, weights: Array) -> Array:
     """By how much each sample is off the polynomial through the six around it, as a standard error; (N,)."""
-    first = np.clip(np.arange(len(time)), 3, len(time) - 4)
-    at = first[:, None] + AROUND
-    t = time[at] - time[first][:, None]
-    # Lagrange's weights at the middle: the product of t_j / (t_j - t_i) over the others.
-    between = t[:, :, None] - t[:, None, :]
-    np.einsum("nii->ni", between)[:] = 1.0
-    others = np.repeat(t[:, None, :], len(AROUND), axis=1)
-    np.einsum("nii->ni", others)[:] = 1.0
-    weights = np.prod(others, axis=2) / np.prod(-between, axis=2) * -1.0
-    missed = values[first] - np.sum(weights * values[at], axis=1)
+    middle = np.clip(np.arange(len(values)), 3, len(values) - 4)
+    missed = values[middle] - sum(weights[:, k] * values[middle + place] for k, place in enumerate(AROUND))
     errors: Array = np.abs(missed) / np.sqrt(1.0 + np.sum(weights**2, axis=1))
     return errors
 
 
-def _cause(name: str, time: Array, values: Array, sample: int) -> str:
+def _cause(name: str, time: Array, values: Array, sample: int, errors: Array, places: Sequence[str]) -> str:
     """Why the samples around one do not determine a second derivative, in words."""
     steps = np.diff(time)
     usual = float(np.median(steps))
-    around = slice(max(sample - 4, 0), sample + 4)
+    around = slice(max(sample - BESIDE, 0), sample + BESIDE)
     short, long = float(np.min(steps[around])), float(np.max(steps[around]))
     if short < SHORT * usual:
-        return f"two samples there are {_seconds(short)} apart, with steps of {_seconds(usual)} elsewhere"
+        pair = around.start + int(np.argmin(steps[around]))
+        return (
+            f"{places[pair]} and {places[pair + 1]} are {_seconds(short)} apart, with steps of "
+            f"{_seconds(usual)} elsewhere"
+        )
     if long > LONG * usual:
         return f"samples are missing there: a step takes {_seconds(long)}, the others {_seconds(usual)}"
     resolution, unit = _resolution(values), coordinate_unit(name)
     if resolution is not None and resolution > 1e-2 * float(np.median(np.abs(np.diff(values)))):
         return f"values have a resolution of {_fine(resolution, unit)} at steps of {_seconds(usual)}"
-    scatter = float(np.median(_departures(time, values))) / MEDIAN
+    scatter = float(np.median(errors)) / MEDIAN
     return f"values scatter by {_fine(scatter, unit)} at steps of {_seconds(usual)}"
 
 

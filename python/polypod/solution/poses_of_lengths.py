@@ -36,25 +36,24 @@ def load_lengths(source: str | PathLike[str], mech: Mechanism) -> Array:
     Raises LengthsError with all faults of the file.
     """
     text = read_text(Path(source))
-    rows = text if isinstance(text, Fault) else read_rows(text)
-    if isinstance(rows, Fault):
-        raise LengthsError([rows], str(source))
-    if len(rows) < 2:
+    table = text if isinstance(text, Fault) else read_rows(text)
+    if isinstance(table, Fault):
+        raise LengthsError([table], str(source))
+    if table is None or not len(table.places):
         example = ", ".join(f"{name} [mm]" for name in mech.leg_names)
         raise LengthsError(
             [Fault("file", f"needs a header such as {example} and a row or more")], str(source)
         )
-    (place, header), *body = rows
     faults: list[Fault] = []
-    columns = read_header(header, place, dict.fromkeys(mech.leg_names, "length"), faults)
+    columns = read_header(table.header, table.place, dict.fromkeys(mech.leg_names, "length"), faults)
     order = {column.name: i for i, column in enumerate(columns) if column}
     for name, actuated in zip(mech.leg_names, mech.actuated.tolist(), strict=True):
         if actuated and name not in order:
-            faults.append(Fault(place, f"there is no column for leg {name}, such as {name} [mm]"))
-    numbers = columns_to_si(read_numbers(body, columns, faults), columns)
+            faults.append(Fault(table.place, f"there is no column for leg {name}, such as {name} [mm]"))
+    numbers = columns_to_si(read_numbers(table, columns, faults), columns)
     if faults:
         raise LengthsError(faults, str(source))
-    lengths = np.full((len(body), mech.n_legs), np.nan)
+    lengths = np.full((len(numbers), mech.n_legs), np.nan)
     for leg, name in enumerate(mech.leg_names):
         if name in order:
             lengths[:, leg] = numbers[:, order[name]]
