@@ -5,7 +5,6 @@ from __future__ import annotations
 import copy
 import json
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -86,10 +85,14 @@ class Mechanism:
         try:
             self._core = _core.Mechanism(json.dumps(spec))
         except _core.Faults as error:
-            faults += [Fault(*fault) for fault in error.args[0]]
-            raise MechanismError(_found(faults, text), origin) from None
+            # What the core misses in lists that are none follows from that.
+            told = {fault.place for fault in faults} & {"legs", "rods"}
+            found = [Fault(*fault) for fault in error.args[0]]
+            faults += [fault for fault in found if fault.place not in told]
         if faults:
-            raise MechanismError(_found(faults, text), origin)
+            from polypod.files.toml_lines import with_lines
+
+            raise MechanismError(with_lines(faults, text), origin)
         self._spec = spec
         legs = spec["legs"]
         self.name: str = spec["name"]
@@ -1118,13 +1121,6 @@ class Mechanism:
 def _by_name(names: Sequence[str], rows: Array) -> dict[str, Array]:
     """The last axis by names; numbers for a single state."""
     return {name: rows[..., i][()] for i, name in enumerate(names)}
-
-
-def _found(faults: Sequence[Fault], text: str | None) -> list[Fault]:
-    """The faults with their lines in the text."""
-    from polypod.files.toml_lines import line_of
-
-    return [fault if text is None else replace(fault, line=line_of(text, fault.place)) for fault in faults]
 
 
 def _in_words(names: Sequence[str]) -> str:

@@ -11,7 +11,7 @@ import pytest
 
 import polypod as pp
 from polypod.errors import Fault
-from polypod.files.csv_columns import read_rows
+from polypod.files.csv_columns import CsvTable, read_rows
 from polypod.files.text import read_text, replacing
 from polypod.solution.poses_of_lengths import load_lengths
 
@@ -111,7 +111,33 @@ def test_the_reader_itself(tmp_path: Path) -> None:
     path = tmp_path / "a.txt"
     path.write_bytes(b"\xef\xbb\xbfa\r\nb")
     assert read_text(path) == "a\nb"
-    assert read_rows("# none\n\na, b\n1, 2\n") == [("line 3", ["a", "b"]), ("line 4", ["1", "2"])]
+    table = read_rows("# none\n\na, b\n1, 2\n# comment\n\n 3, x \n")
+    assert isinstance(table, CsvTable)
+    assert (table.place, table.header) == ("line 3", ["a", "b"])
+    assert (table.places, table.cells) == (["line 4", "line 7"], [["1", "2"], ["3", "x"]])
+    assert table.numbers is None
+
+
+@pytest.mark.parametrize("end", ["", "\n", "\n\n \n"])
+def test_rows_of_numbers_alone_are_not_kept_as_texts(end: str) -> None:
+    table = read_rows("# none\n\na, b\n1, 2\n 3 ,-4e-1" + end)
+    assert isinstance(table, CsvTable)
+    assert table.cells is None
+    assert table.numbers is not None
+    assert table.numbers.tolist() == [[1.0, 2.0], [3.0, -0.4]]
+    assert [*table.places] == ["line 4", "line 5"]
+    assert table.places[1:] == ["line 5"]
+
+
+@pytest.mark.parametrize(
+    "rows", ["1,2\n\n3,4", "1,2\n3", "1,nan", "1,inf", "1,2 # a", '"1",2', "1,", "1,2,3", ""]
+)
+def test_other_rows_are_looked_at_cell_by_cell(rows: str) -> None:
+    table = read_rows("a,b\n" + rows)
+    assert isinstance(table, CsvTable)
+    assert table.numbers is None
+    assert table.cells is not None
+    assert len(table.cells) == len(table.places)
 
 
 def test_what_is_written_appears_whole_or_not_at_all(tmp_path: Path) -> None:

@@ -110,3 +110,35 @@ def test_without_a_text_there_is_no_line() -> None:
     assert fault.line is None
     assert str(fault).startswith("platform.mass: is -1 kg")
     assert str(Fault("a", "b", 3)) == "a (line 3): b"
+
+
+SINGLE = """\
+name = "m"
+[units]
+length = "m"
+angle = "rad"
+[home]
+position = [0, 0, 1]
+[legs]
+base = { joint = "S", point = [1, 0, 0] }
+platform = { joint = "S", point = [1, 0, 0] }
+"""
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        (SINGLE, "legs (line 7): is a table; needs one table [[legs]] for each"),
+        (
+            SINGLE + SINGLE[SINGLE.index("[legs]") :],
+            "toml (line 10): [legs] stands there twice; a list of tables has two brackets, [[legs]]",
+        ),
+    ],
+    ids=["once", "twice"],
+)
+def test_single_brackets_of_a_list_are_one_fault(tmp_path, text: str, expected: str) -> None:
+    file = tmp_path / "m.toml"
+    file.write_text(text)
+    with pytest.raises(MechanismError) as caught:
+        pp.load(file)
+    assert [str(fault) for fault in caught.value.faults] == [expected]

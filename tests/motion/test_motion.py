@@ -2,6 +2,7 @@
 
 import copy
 import math
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -496,8 +497,66 @@ def test_toml_faults(
     for key in path[:-1]:
         target = target[key]
     target[path[-1]] = value
-    found = faults(write("a.toml", tomli_w.dumps(keyframes)))
+    found = [
+        re.sub(r" \(line \d+\)", "", fault) for fault in faults(write("a.toml", tomli_w.dumps(keyframes)))
+    ]
     assert any(expected in fault for fault in found), found
+
+
+LINES = """\
+[motion]
+coordinates = "paper"
+spline = "cubic"
+[units]
+time = "s"
+length = "mile"
+angle = "deg"
+[[keyframes]]
+time = 0
+x = 0
+y = 0
+z = 0
+alpha = 0
+beta = 0
+[[keyframes]]
+time = 1
+x = 0
+y = "b"
+z = 0
+alpha = 0
+beta = 0
+gama = 3
+"""
+
+
+def test_toml_faults_have_their_lines_and_each_is_one(write: Write) -> None:
+    assert [fault.partition(": ")[0] for fault in faults(write("a.toml", LINES))] == [
+        "units.length (line 6)",
+        "motion.spline (line 3)",
+        "keyframes.2.y (line 18)",
+        "keyframes.2.gama (line 22)",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("old", "expected"),
+    [
+        (
+            "[[keyframes]]",
+            "toml (line 15): [keyframes] stands there twice; a list of tables has two brackets, "
+            "[[keyframes]]",
+        ),
+        (
+            "[[keyframes]]\ntime = 0",
+            "keyframes (line 8): is a table, [keyframes]; needs two tables [[keyframes]] or more",
+        ),
+    ],
+)
+def test_toml_with_single_brackets(write: Write, old: str, expected: str) -> None:
+    text = LINES.replace(old, old.replace("[[", "[").replace("]]", "]"))
+    if "time" in old:
+        text = text[: text.index("[[keyframes]]")]
+    assert expected in faults(write("a.toml", text))
 
 
 def test_toml_all_faults_at_once(write: Write, keyframes: dict[str, Any]) -> None:
@@ -505,7 +564,7 @@ def test_toml_all_faults_at_once(write: Write, keyframes: dict[str, Any]) -> Non
     keyframes["units"]["length"] = "mile"
     keyframes["keyframes"][0]["x"] = "a"
     del keyframes["keyframes"][2]["y"]
-    assert [fault.split(":")[0] for fault in faults(write("a.toml", tomli_w.dumps(keyframes)))] == [
+    assert [fault.split(" ")[0] for fault in faults(write("a.toml", tomli_w.dumps(keyframes)))] == [
         "units.length",
         "motion.spline",
         "keyframes.1.x",

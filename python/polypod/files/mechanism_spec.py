@@ -170,7 +170,7 @@ def _list(data: dict[str, Any], key: str, faults: list[Fault]) -> list[Any]:
     value = data.get(key, [])
     if not isinstance(value, (list, tuple)):
         faults.append(Fault(key, f"is {shown(value)}; needs one table [[{key}]] for each"))
-        return []
+        return [value] if isinstance(value, dict) else []
     return list(value)
 
 

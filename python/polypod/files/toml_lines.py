@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import re
 import tomllib
+from collections.abc import Iterable
+from dataclasses import replace
 from functools import lru_cache
 from typing import Any
 
@@ -17,6 +19,7 @@ _TEXTS = re.compile(
     r'"""(?:\\.|[^\\])*?"""|' r"'''.*?'''" r'|"(?:\\.|[^"\\\n])*"' r"|'[^'\n]*'" r"|\#[^\n]*", re.DOTALL
 )
 _WHERE = re.compile(r"(.*) \(at (?:line (\d+), column (\d+)|end of document)\)", re.DOTALL)
+_TWICE = re.compile(r"Cannot declare \((.*)\) twice")
 _LONGEST_INTEGER = 4300
 """Digits: more of them Python does not read."""
 
@@ -31,6 +34,10 @@ def read_toml(text: str) -> dict[str, Any] | Fault:
         where = _WHERE.fullmatch(str(error))
         if where is None:
             return Fault("toml", str(error))
+        if where[2] and (twice := _TWICE.fullmatch(where[1])):
+            name = ".".join(part.strip("' ") for part in twice[1].split(",") if part.strip())
+            message = f"[{name}] stands there twice; a list of tables has two brackets, [[{name}]]"
+            return Fault("toml", message, int(where[2]))
         if where[2] is None:
             return Fault("toml", f"{where[1]}, at the end of the text", text.rstrip("\n").count("\n") + 1)
         return Fault("toml", f"{where[1]}, at column {where[3]}", int(where[2]))
@@ -56,6 +63,11 @@ def line_of(text: str, place: str) -> int | None:
         if path[:length] in lines:
             return lines[path[:length]]
     return None
+
+
+def with_lines(faults: Iterable[Fault], text: str | None) -> list[Fault]:
+    """The faults with their lines in the text; as they are without one."""
+    return [fault if text is None else replace(fault, line=line_of(text, fault.place)) for fault in faults]
 
 
 @lru_cache(maxsize=1)

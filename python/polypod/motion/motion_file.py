@@ -50,7 +50,7 @@ from polypod.files.csv_columns import (
 )
 from polypod.files.tables import Number, Table, Vector, read_table
 from polypod.files.text import read_text
-from polypod.files.toml_lines import read_toml
+from polypod.files.toml_lines import read_toml, with_lines
 from polypod.files.units import KIND_OF_COORDINATE, MOTION_KINDS, read_units
 from polypod.motion.motion import SPLINES, Array, Axes, Motion, linear, not_increasing
 
@@ -258,12 +258,17 @@ def _read_toml(text: str, source: str, mech: HasCoordinateSets | CoordinateSets)
     data = read_toml(text)
     if isinstance(data, Fault):
         raise MotionError([data], source)
+
+    def refused(faults: Iterable[Fault]) -> MotionError:
+        return MotionError(with_lines(faults, text), source)
+
     faults = [Fault(k, f"is no key here; {alternatives(k, _SECTIONS)}") for k in data if k not in _SECTIONS]
     settings = read_table(_Settings, data.get("motion", {}), "motion", faults)
     wrench = read_table(_Wrench, data.get("wrench", {}), "wrench", faults) or _Wrench()
     tables = data.get("keyframes", [])
     if not isinstance(tables, list) or len(tables) < 2:
-        faults.append(Fault("keyframes", "needs two tables [[keyframes]] or more"))
+        found = "is a table, [keyframes]; " if isinstance(tables, dict) else ""
+        faults.append(Fault("keyframes", f"{found}needs two tables [[keyframes]] or more"))
         tables = []
 
     given = {key for table in tables if isinstance(table, dict) for key in table}
@@ -273,7 +278,7 @@ def _read_toml(text: str, source: str, mech: HasCoordinateSets | CoordinateSets)
         if settings:
             message = f"is {shown(chosen)}, no coordinate set of the mechanism; {alternatives(chosen, sets)}"
             # Which names the keyframes should have is then open: no more can be said of them.
-            raise MotionError([*faults, Fault("motion.coordinates", message)], source)
+            raise refused([*faults, Fault("motion.coordinates", message)])
         chosen = _nearest_set(given, sets)
     model = _keyframe(sets[chosen])
     read = [read_table(model, table, f"keyframes.{i}", faults) for i, table in enumerate(tables, 1)]
@@ -287,7 +292,7 @@ def _read_toml(text: str, source: str, mech: HasCoordinateSets | CoordinateSets)
     used = {"time", *loaded, *filter(None, map(KIND_OF_COORDINATE.get, sets[chosen]))}
     units, unit_faults = read_units(data.get("units", {}), used, MOTION_KINDS)
     if faults or unit_faults or not settings:
-        raise MotionError([*unit_faults, *faults], source)
+        raise refused([*unit_faults, *faults])
 
     def column(key: str, kind: str | None) -> Array:
         """(keyframes,) or (keyframes, 3); the load is [wrench]'s where a keyframe has none."""
