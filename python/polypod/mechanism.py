@@ -269,6 +269,8 @@ class Mechanism:
     @property
     def warnings(self) -> list[str]:
         """Warnings for the user of this mechanism, in plain words."""
+        from polypod.files.body_plausibility import implausible_bodies
+
         mobility, notes = self.mobility(), []
         sigma = self.conditioning(self.home)
         if mobility.uncontrolled:
@@ -315,6 +317,7 @@ class Mechanism:
                     f" Legs with U joints at both ends ({', '.join(held)}) do not rotate about their own "
                     "lines; where they should, they have a spherical joint at one end: UPS or SPU."
                 )
+        notes += implausible_bodies(self.geometry, float(np.max(spans(self))))
         notes += [f"local degree of freedom: {idle}; nothing drives or holds it." for idle in mobility.idle]
         if mobility.passive:
             notes.append(

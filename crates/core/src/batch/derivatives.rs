@@ -338,8 +338,8 @@ work! {
     }
 }
 
-/// Where a column of active forces and multipliers goes: the row of J of each leg, none of a passive one, and the
-/// rows of the constraints.
+/// Where a column of active forces and multipliers goes: the row of J of each leg, none of a passive one, and
+/// the rows of the constraints.
 struct ColumnRows {
     legs: Vec<Option<usize>>,
     constraints: Range<usize>,
