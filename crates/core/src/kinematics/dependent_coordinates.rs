@@ -287,8 +287,8 @@ pub(super) fn residual<N: Real>(mech: &Mechanism<impl Constant<N>>, pose: &Pose<
     values
 }
 
-/// Pivot ratio of ∂g/∂y at a pose, y being the numbers of the set that are not given: how well the constraints
-/// determine them there. NaN where it is not known.
+/// Pivot ratio of ∂g/∂y at a pose, y being the numbers of the set that are not given, in m and rad: how well
+/// the constraints determine them there. NaN where it is not known.
 #[must_use]
 pub fn dependent_pivots(mech: &Mechanism, set: &Set, pose: &Pose<f64>, given: &[bool]) -> f64 {
     let q = set.values(mech, pose).map(Jet::lit);
