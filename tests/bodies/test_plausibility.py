@@ -48,3 +48,11 @@ def test_other_units_than_meant_are_told(place: tuple[str, str], value: object, 
     (warning,) = doubts(pp.Mechanism.from_dict(data))
     assert expected in warning
     assert "the longest leg has 754.4 mm at the centre pose" in warning
+
+
+def test_a_mass_next_to_zero_is_told_without_overflow(recwarn: pytest.WarningsRecorder):
+    data = pp.load(NAME).to_dict()
+    data["platform"]["mass"] = 5e-324
+    (warning,) = doubts(pp.Mechanism.from_dict(data))
+    assert "far larger than the machine: platform" in warning
+    assert not recwarn.list

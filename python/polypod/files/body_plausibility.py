@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from typing import Any
 
@@ -21,7 +22,8 @@ def implausible_bodies(geometry: dict[str, Any], longest: float) -> list[str]:
         if mass > DENSITY * longest**3:
             heavy.append(f"{name} ({mass:.4g} kg)")
         if mass > 0.0 and inertia.any():
-            radius = float(np.sqrt(np.linalg.eigvalsh(inertia)[-1] / mass))
+            # Roots first: a mass next to zero leaves no finite square.
+            radius = math.sqrt(max(float(np.linalg.eigvalsh(inertia)[-1]), 0.0)) / math.sqrt(mass)
             shown = f"{name} ({1e3 * radius:.3g} mm)"
             wide += [shown] if radius > LARGEST * longest else []
             narrow += [shown] if radius < LEAST * longest else []
