@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+import numpy as np
+import pytest
+
+import polypod as pp
+from polypod.errors import MechanismError
 from support import oracle as o
 from support.cases import any_case, each
 
@@ -17,3 +22,39 @@ def test_mobility(name):
         assert getattr(m, key) == getattr(counted, key), key
     assert m.redundant == 6 * counted.loops - counted.closure_rank
     assert m.passive == counted.joint_freedoms - counted.closure_rank - freedoms
+
+
+UNITS = {
+    "length": "m",
+    "angle": "rad",
+    "mass": "kg",
+    "inertia": "kg m^2",
+    "force": "N",
+    "torque": "N m",
+    "acceleration": "m/s^2",
+}
+
+
+def _six_upu(*, parallel: bool) -> dict[str, object]:
+    """Six legs with U joints at both ends, whose axes are parallel, or with the leg in a plane."""
+    legs = []
+    for i, (a, b) in enumerate(zip([10, 110, 130, 230, 250, 350], [50, 70, 170, 190, 290, 310], strict=True)):
+        foot, end = (np.array([np.cos(np.radians(x)), np.sin(np.radians(x)), 0.0]) for x in (a, b))
+        leg = 0.5 * end + np.array([0.0, 0.0, 1.0]) - foot
+        other = foot if parallel else foot + 0.1 * (i + 1) * leg
+        legs.append(
+            {
+                "base": {"joint": "U", "point": foot.tolist(), "axis": foot.tolist()},
+                "platform": {"joint": "U", "point": (0.5 * end).tolist(), "axis": other.tolist()},
+            }
+        )
+    return {"name": "6-UPU", "units": UNITS, "home": {"position": [0, 0, 1.0]}, "legs": legs}
+
+
+def test_legs_with_universal_joints_at_both_ends_are_explained():
+    """Whoever writes six of them mostly means UPS legs."""
+    (warning,) = (w for w in pp.Mechanism.from_dict(_six_upu(parallel=True)).warnings if "UPS" in w)
+    assert "U joints at both ends (1, 2, 3, 4, 5, 6)" in warning
+    with pytest.raises(MechanismError) as caught:
+        pp.Mechanism.from_dict(_six_upu(parallel=False))
+    assert any("has a spherical joint at one end, UPS or SPU" in str(f) for f in caught.value.faults)
