@@ -9,6 +9,7 @@ import polypod as pp
 from polypod.errors import MechanismError
 from support import oracle as o
 from support.cases import any_case, each
+from support.mechanism_files import SI_UNITS
 
 
 @each
@@ -24,17 +25,6 @@ def test_mobility(name):
     assert m.passive == counted.joint_freedoms - counted.closure_rank - freedoms
 
 
-UNITS = {
-    "length": "m",
-    "angle": "rad",
-    "mass": "kg",
-    "inertia": "kg m^2",
-    "force": "N",
-    "torque": "N m",
-    "acceleration": "m/s^2",
-}
-
-
 def _six_upu(*, parallel: bool) -> dict[str, object]:
     """Six legs with U joints at both ends, whose axes are parallel, or with the leg in a plane."""
     legs = []
@@ -48,7 +38,7 @@ def _six_upu(*, parallel: bool) -> dict[str, object]:
                 "platform": {"joint": "U", "point": (0.5 * end).tolist(), "axis": other.tolist()},
             }
         )
-    return {"name": "6-UPU", "units": UNITS, "home": {"position": [0, 0, 1.0]}, "legs": legs}
+    return {"name": "6-UPU", "units": SI_UNITS, "home": {"position": [0, 0, 1.0]}, "legs": legs}
 
 
 def test_legs_with_universal_joints_at_both_ends_are_explained():

@@ -9,6 +9,7 @@ import pytest
 
 import polypod as pp
 from polypod import Status
+from support.mechanism_files import SI_UNITS
 
 REST = np.zeros(6)
 
@@ -38,19 +39,10 @@ def _leg(
 
 
 X, Y = [1, 0, 0], [0, 1, 0]
-UNITS = {
-    "length": "m",
-    "angle": "rad",
-    "mass": "kg",
-    "inertia": "kg m^2",
-    "force": "N",
-    "torque": "N m",
-    "acceleration": "m/s^2",
-}
 CROSSING = pp.Mechanism.from_dict(
     {
         "name": "crossing rods",
-        "units": UNITS,
+        "units": SI_UNITS,
         "home": {"position": [0, 0, 0.74]},
         "dynamics": {"gravity": [0.7, -0.4, -9.6]},
         "load": {"force": [10, 10, 500], "torque": [2, -3, 20]},

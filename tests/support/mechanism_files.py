@@ -14,6 +14,16 @@ FILES = {
 TABLES = {name: tomllib.loads(path.read_text(encoding="utf-8")) for name, path in FILES.items()}
 PAPER, GOUGH, RPS = FILES
 
+SI_UNITS = {
+    "length": "m",
+    "angle": "rad",
+    "mass": "kg",
+    "inertia": "kg m^2",
+    "force": "N",
+    "torque": "N m",
+    "acceleration": "m/s^2",
+}
+
 DELETED = object()
 
 

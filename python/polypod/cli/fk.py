@@ -94,7 +94,7 @@ def _print_poses(out: Console, found: PosesOfLengths) -> None:
 
     total = len(found.pose)
     if total:
-        rotation = {name: from_si(q[:MOST_POSES], "angle", "deg") for name, q in found.rotation().items()}
+        rotation = {name: from_si(q[:MOST_POSES], "angle", "deg") for name, q in found.rotation.items()}
         headers = ["row>", "mode>", "o / mm>", *(f"{name} / deg>" for name in rotation)]
         table = new_table(f"Poses of {escape(found.mech.name)}", *headers, "side", "det J", "status")
         table.box, table.pad_edge, table.collapse_padding = None, False, True

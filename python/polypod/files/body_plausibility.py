@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -17,7 +16,7 @@ LARGEST, LEAST = 5.0, 3e-3
 def implausible_bodies(geometry: dict[str, Any], longest: float) -> list[str]:
     """A sentence for each kind of doubt about the bodies of a mechanism; `longest`: its longest leg, m."""
     heavy, wide, narrow = [], [], []
-    for name, body in _bodies(geometry):
+    for name, body in bodies_of(geometry).items():
         mass, inertia = body["mass"], np.array(body["inertia"])
         if mass > DENSITY * longest**3:
             heavy.append(f"{name} ({mass:.4g} kg)")
@@ -38,13 +37,13 @@ def implausible_bodies(geometry: dict[str, Any], longest: float) -> list[str]:
     return [f"{sentence} Check the units of mass and inertia." for sentence in found]
 
 
-def _bodies(geometry: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:
-    """Those that have numbers, with their names."""
+def bodies_of(geometry: dict[str, Any]) -> dict[str, dict[str, Any]]:
+    """The bodies of a mechanism that have numbers, by name."""
     bodies = {"platform": geometry["platform"]}
     bodies |= {f"rod {rod['name']}": rod["body"] for rod in geometry["rods"]}
     for leg in geometry["legs"]:
         bodies |= {f"{link} of leg {leg['name']}": leg[link] for link in ("cylinder", "piston")}
-    yield from ((name, body) for name, body in bodies.items() if body)
+    return {name: body for name, body in bodies.items() if body}
 
 
 def _few(names: list[str]) -> str:

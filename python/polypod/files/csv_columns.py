@@ -46,18 +46,18 @@ class CsvTable:
     """(rows, columns), the numbers as they stand there, if all cells are finite ones."""
 
 
-class LineNumbers(Sequence[str]):
-    """The places "line k", "line k + 1" and so on."""
+class NumberedPlaces(Sequence[str]):
+    """Places such as "line 3", "line 4" and so on, made when they are asked for."""
 
-    def __init__(self, first: int, count: int) -> None:
-        self._lines = range(first, first + count)
+    def __init__(self, word: str, first: int, count: int) -> None:
+        self._word, self._numbers = word, range(first, first + count)
 
     def __len__(self) -> int:
-        return len(self._lines)
+        return len(self._numbers)
 
     def __getitem__(self, index: Any) -> Any:
-        line = self._lines[index]
-        return [f"line {k}" for k in line] if isinstance(line, range) else f"line {line}"
+        found = self._numbers[index]
+        return [f"{self._word} {k}" for k in found] if isinstance(found, range) else f"{self._word} {found}"
 
 
 def read_rows(text: str) -> CsvTable | Fault | None:
@@ -72,7 +72,7 @@ def read_rows(text: str) -> CsvTable | Fault | None:
         if separator := _other_separator(header):
             return Fault(place, f"has {separator} between its columns; {_SEPARATED}")
         if (numbers := _numbers_alone(lines[first:], len(header))) is not None:
-            return CsvTable(place, header, LineNumbers(first + 1, len(numbers)), None, numbers)
+            return CsvTable(place, header, NumberedPlaces("line", first + 1, len(numbers)), None, numbers)
         rows = [(f"line {reader.line_num}", row) for row in map(_stripped, reader) if _counts(row)]
     except csv.Error as error:
         return Fault(f"line {reader.line_num}", f"is no row of a CSV file: {error}")

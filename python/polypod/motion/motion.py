@@ -15,6 +15,7 @@ from scipy.interpolate import BPoly, make_interp_spline
 from polypod.answers.notebook import card, counted, numbers, rows_of
 from polypod.answers.variables import COMPONENTS, TIME, variable
 from polypod.errors import Fault, MotionError, ShapeError, shown
+from polypod.files.csv_columns import NumberedPlaces
 from polypod.files.units import coordinate_unit, instant
 from polypod.motion.sample_noise import warnings_about
 
@@ -121,7 +122,7 @@ class Motion:
         if len(t) < 2:
             raise MotionError([Fault("time", f"has too few samples, {len(t)}; needs two or more")], name)
         made = cls.along(spline_through(t, _columns_of(q)), t, tuple(q), set=set, name=name, **more)
-        named = [f"sample {i}" for i in range(1, len(t) + 1)] if places is None else places
+        named = NumberedPlaces("sample", 1, len(t)) if places is None else places
         return replace(made, warnings=tuple(warnings_about(t, q, made.second_rates, named)))
 
     @classmethod

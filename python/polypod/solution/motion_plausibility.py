@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from polypod.mechanism import Mechanism
+from polypod.files.body_plausibility import bodies_of
+from polypod.mechanism import Mechanism, spans
 from polypod.motion.motion import Motion
 
 Array = NDArray[np.float64]
@@ -27,7 +28,7 @@ def _relative(mech: Mechanism, pose: Array) -> list[str]:
         return []
     away = float(np.min(np.linalg.norm(known - home, axis=-1)))
     if_relative = float(np.min(np.linalg.norm(known, axis=-1)))
-    size = float(np.mean(mech.inverse_kinematics(mech.home).lengths))
+    size = float(np.mean(spans(mech)))
     if not (away > FAR * size and if_relative < NEAR * away):
         return []
     place = ", ".join(f"{1e3 * x:.5g}" for x in home)
@@ -43,9 +44,7 @@ def _without_forces(mech: Mechanism, motion: Motion) -> list[str]:
     data = mech.geometry
     load = data["load"] if motion.wrench is None else {"wrench": motion.wrench}
     loaded = any(np.any(np.asarray(value, dtype=float)) for key, value in load.items() if key != "axes")
-    bodies = [data["platform"], *(rod["body"] for rod in data["rods"])]
-    bodies += [leg[link] for leg in data["legs"] for link in ("cylinder", "piston")]
-    heavy = any(np.any(body[key]) for body in filter(None, bodies) for key in ("mass", "inertia"))
+    heavy = any(np.any(body[key]) for body in bodies_of(data).values() for key in ("mass", "inertia"))
     damped = data["linear_damping"] or data["angular_damping"]
     if loaded or heavy or damped:
         return []

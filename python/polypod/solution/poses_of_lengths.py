@@ -13,6 +13,7 @@ import csv
 import itertools
 import math
 from dataclasses import dataclass
+from functools import cached_property
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -97,6 +98,7 @@ class PosesOfLengths:
         """Sets that have poses, of which one may be missing."""
         return int(np.sum((self.number > 0) & (self.row_status == Status.NOT_CONVERGED)))
 
+    @cached_property
     def rotation(self) -> dict[str, Array]:
         """Angles of the rotation, (M,) each: those of the first coordinate set, or rx, ry, rz of `tool`."""
         angles = {name: q for name, q in self.coordinates.items() if KIND_OF_COORDINATE[name] == "angle"}
@@ -147,7 +149,7 @@ class PosesOfLengths:
         answer are empty.
         """
         others = {name: q for name, q in self.coordinates.items() if name not in ("x", "y", "z")}
-        others |= {name: q for name, q in self.rotation().items() if name not in others}
+        others |= {name: q for name, q in self.rotation.items() if name not in others}
         columns: dict[str, list[Any]] = {"row": self.row.tolist(), "mode": self.mode.tolist()}
         columns |= {f"{name} [m]": self.pose[:, i, 3].tolist() for i, name in enumerate("xyz")}
         for name, q in others.items():

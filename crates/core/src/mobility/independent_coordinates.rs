@@ -9,9 +9,9 @@ use crate::spatial::Pose;
 
 /// A mark for each number of the set, true if it is to be given: as many as there are degrees of freedom.
 ///
-/// Those of a choice are judged by the pivot ratio of ∂g/∂y \[T23\] at home and at generic poses near it,
-/// which the machine can have: a choice that is regular at more of them is better, then one whose median is
-/// larger. Home alone does not do: it may be a singular pose of the constraints, where no choice is regular.
+/// Those of a choice are judged by the pivot ratio of ∂g/∂y \[T23\] at generic poses near home, which the
+/// machine can have: a choice that is regular at more of them is better, then one whose median is
+/// larger. Home itself does not do: it may be a singular pose of the constraints, where no choice is regular.
 #[must_use]
 pub fn best_given(mech: &Mechanism, set: &Set) -> Vec<bool> {
     if let Some(given) = set.given(mech) {
