@@ -14,7 +14,19 @@ import tomli_w
 import polypod as pp
 from polypod.errors import MechanismError, UnknownNameError
 from polypod.files.units import from_si, to_si
-from support.mechanism_files import BUILT_IN, DELETED, FILES, GOUGH, MIDDLE, PAPER, RPS, TABLES, UP, changed
+from support.mechanism_files import (
+    BUILT_IN,
+    DELETED,
+    FILES,
+    GOUGH,
+    MIDDLE,
+    PAPER,
+    RPS,
+    SI_UNITS,
+    TABLES,
+    UP,
+    changed,
+)
 
 UNIT_ROUNDING = 1e-15  # m, of points about 1 m away: a few roundings, of sine and cosine and of the unit
 
@@ -366,11 +378,10 @@ def converted(value: Any, old: dict[str, str], new: dict[str, str], key: str = "
     return value
 
 
-SI = {"length": "m", "angle": "rad", "mass": "kg", "inertia": "kg m^2", "force": "N", "torque": "N m"}
 ODD = {"length": "in", "angle": "rad", "mass": "lb", "inertia": "g mm^2", "force": "mN", "torque": "kN m"}
 
 
-@pytest.mark.parametrize("units", [SI | {"acceleration": "m/s^2"}, ODD | {"acceleration": "mm/s^2"}])
+@pytest.mark.parametrize("units", [SI_UNITS, ODD | {"acceleration": "mm/s^2"}])
 @pytest.mark.parametrize("name", FILES)
 def test_units_of_the_file_do_not_matter(name: str, units: dict[str, str]) -> None:
     mech = pp.load(FILES[name])

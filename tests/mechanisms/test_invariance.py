@@ -17,13 +17,12 @@ import polypod as pp
 from polypod import Status
 from polypod.files.units import from_si
 from support import DATA
+from support.mechanism_files import SI_UNITS
 
 Array = NDArray[np.float64]
 Tables = dict[str, Any]
 
 NAMES = ("lu-3spu-2rpu-r", "stewart-gough", "3-rps")
-SI = {"length": "m", "angle": "rad", "mass": "kg", "inertia": "kg m^2", "force": "N", "torque": "N m"}
-SI |= {"acceleration": "m/s^2"}
 
 INVARIANT = (
     1e-10  # relative to the largest number of its kind: rounding, times the condition number of J, up to 1e3
@@ -55,7 +54,7 @@ def tables_of(name: str) -> Tables:
         if leg["base"]["rod"] is not None:
             leg["base"]["rod"] = rods[leg["base"]["rod"]]["name"]
     tables = {key: spec[key] for key in ("name", "home", "tool", "legs")} | {
-        "units": SI,
+        "units": SI_UNITS,
         "dynamics": {"efficiency": 0.8, "linear_damping": 30.0, "angular_damping": 2.0}
         | {"gravity": [1.0, -2.0, -9.0]},
         "load": {"force": [30.0, -20.0, 100.0], "torque": [5.0, 10.0, -15.0], "axes": "platform"},
