@@ -66,6 +66,8 @@ fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_function(wrap_pyfunction!(derivatives::geometry_parameters, m)?)?;
     m.add_function(wrap_pyfunction!(derivatives::base_parameters, m)?)?;
     m.add_function(wrap_pyfunction!(workspace::fit_poses, m)?)?;
+    m.add_function(wrap_pyfunction!(workspace::lead_poses, m)?)?;
+    m.add_function(wrap_pyfunction!(workspace::pose_bounds, m)?)?;
     m.add_class::<simulation::PyChart>()?;
     m.add_class::<workspace::PyFlood>()?;
     m.add_class::<workspace::PyLattice>()?;

@@ -5,8 +5,9 @@ use polypod_core::batch::pose_of;
 use polypod_core::parallel::threads::Team;
 use polypod_core::spatial::{Pose, Vec3};
 use polypod_core::workspace::fit_orientation::fit;
-use polypod_core::workspace::flood_fill::{Flood, Grid, Stop};
+use polypod_core::workspace::flood_fill::{Flood, Grid, Stop, led};
 use polypod_core::workspace::length_lattice::Lattice;
+use polypod_core::workspace::pose_bounds::{Bounded, PoseBounds};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -44,6 +45,55 @@ pub fn fit_poses<'py>(
         fit(mech.get().core(), &pose, pose.o).map_or([f64::NAN; 16], |pose| pose.matrix())
     });
     PyArray1::from_vec(py, fitted.collect()).reshape([poses.len() / 16, 4, 4])
+}
+
+/// The poses (n, 4, 4) that are reached from given ones on straight ways of o to given points (n, 3), in small
+/// pieces; NaN where the way is not open.
+#[pyfunction]
+pub fn lead_poses<'py>(
+    py: Python<'py>,
+    mech: &Bound<'py, PyMechanism>,
+    poses: Array<'py>,
+    points: Array<'py>,
+    keep_aspect: bool,
+    threads: usize,
+) -> PyResult<Bound<'py, PyArray3<f64>>> {
+    let (poses, points) = (slice(&poses)?, slice(&points)?);
+    let n = poses.len() / 16;
+    if poses.len() != 16 * n || points.len() != 3 * n {
+        return Err(PyValueError::new_err("needs one point for each whole pose"));
+    }
+    let (core, team) = (mech.get().core(), team(threads)?);
+    let point = |i: usize| Vec3::new(points[3 * i], points[3 * i + 1], points[3 * i + 2]);
+    let ways: Vec<_> = (0..n).map(|i| (pose_of(&poses[16 * i..16 * i + 16]), point(i))).collect();
+    let poses = py.detach(|| team.install(|| led(core, &ways, keep_aspect)));
+    let led: Vec<f64> =
+        poses.iter().flat_map(|pose| pose.map_or([f64::NAN; 16], |pose| pose.matrix())).collect();
+    PyArray1::from_vec(py, led).reshape([n, 4, 4])
+}
+
+/// What bounds a pose: values (n,), and their derivatives (n, 6) by v and ω in base axes, of the constraints,
+/// the limits, the legs' directions, and det J.
+#[pyfunction]
+pub fn pose_bounds<'py>(
+    py: Python<'py>,
+    mech: &Bound<'py, PyMechanism>,
+    pose: Array<'py>,
+) -> PyResult<Bound<'py, PyDict>> {
+    let bounds = PoseBounds::at(mech.get().core(), &start_pose(&pose)?);
+    let result = PyDict::new(py);
+    let enter = |name: &str, of: &[Bounded]| {
+        let values: Vec<f64> = of.iter().map(|b| b.value).collect();
+        let rows: Vec<f64> =
+            of.iter().flat_map(|b| [b.row.force.array(), b.row.torque.array()].concat()).collect();
+        let rows = PyArray1::from_vec(py, rows).reshape([of.len(), 6])?;
+        result.set_item(name, (PyArray1::from_vec(py, values), rows))
+    };
+    enter("constraints", &bounds.constraints)?;
+    enter("limits", &bounds.limits)?;
+    enter("ahead", &bounds.ahead)?;
+    enter("determinant", &[bounds.determinant])?;
+    Ok(result)
 }
 
 #[pyclass(name = "Flood")]

@@ -184,7 +184,7 @@ def _check_workspace_options(
 
 def _print_workspace(out: Console, facts: dict[str, Any]) -> None:
     from polypod.files.units import coordinate_unit, readable
-    from polypod.summary.tables import ends_table, extents_table
+    from polypod.summary.tables import ends_table, extent_limits_table, extents_table
 
     fixed = ", ".join(
         f"{name} = {readable(value, coordinate_unit(name))}" for name, value in facts.get("fixed", {}).items()
@@ -198,6 +198,7 @@ def _print_workspace(out: Console, facts: dict[str, Any]) -> None:
         highlight=False,
     )
     print_words(out, extents_table(facts))
+    print_words(out, extent_limits_table(facts))
     print_words(out, ends_table(facts))
 
 

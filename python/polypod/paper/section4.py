@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from polypod.mechanism import Mechanism
 from polypod.workspaces.length_lattice import LengthLattice, length_lattice
+from polypod.workspaces.reachable import extremes_within
 from polypod.workspaces.search import workspace
 from polypod.workspaces.workspace import Workspace
 
@@ -50,8 +51,14 @@ class Section4:
             }
 
         def flooded(of: Workspace) -> dict[str, Any]:
-            volume = {"volume": of.volume, "volume_error": of.volume_error}
-            return {"step": of.inputs["step"]["x"], **sizes(of, widths_above(of, z)), **volume}
+            above = extremes_within(of, {"z": (z, top)})
+            return {
+                "step": of.inputs["step"]["x"],
+                **sizes(of, np.ptp(above.values, axis=1)[:2]),
+                "extent_error": float(max(of.extremes.errors.max(), above.errors.max())),
+                "volume": of.volume,
+                "volume_error": of.volume_error,
+            }
 
         return {
             "printed": list(PRINTED),
@@ -81,18 +88,6 @@ def section4(
     )
 
 
-def widths_above(workspace: Workspace, z: float) -> Array:
-    """(2,): extents along x and y of the part of a boundary above z, m; NaN where there is none."""
-    edges = workspace.faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
-    first, second = workspace.vertices[edges[:, 0]], workspace.vertices[edges[:, 1]]
-    crossing = (first[:, 2] > z) != (second[:, 2] > z)
-    first, second = first[crossing], second[crossing]
-    share = ((z - first[:, 2]) / (second[:, 2] - first[:, 2]))[:, None]
-    above = workspace.vertices[workspace.vertices[:, 2] > z]
-    points = np.concatenate([above, first + share * (second - first)])
-    return np.ptp(points[:, :2], axis=0) if len(points) else np.full(2, np.nan)
-
-
 def as_markdown(facts: dict[str, Any]) -> str:
     """The table of `Section4.facts`, in mm."""
 
@@ -100,24 +95,27 @@ def as_markdown(facts: dict[str, Any]) -> str:
         return f"| {name} | " + " | ".join(f"{1e3 * size:.1f}" for size in sizes) + " |"
 
     flood, aspect, lattice = facts["flood"], facts["aspect"], facts["lattice"]
-    grid, lengths = f"grid of {1e3 * flood['step']:g} mm", f"lengths in steps of {1e3 * lattice['step']:g} mm"
+    lengths = f"lengths in steps of {1e3 * lattice['step']:g} mm"
     rows = [
         "| sizes / mm | X | Y | Z |",
         "|---|---|---|---|",
         row("printed", facts["printed"]),
-        row(f"{grid}, full, Z ≥ 0", flood["full"]),
+        row("in pose space, full, Z ≥ 0", flood["full"]),
         row("... cut at the printed height", flood["cut"]),
-        row(f"{grid}, one aspect, full", aspect["full"]),
+        row("in pose space, one aspect, full", aspect["full"]),
         row("... cut at the same height", aspect["cut"]),
         row(f"lattice of {lengths}, the same aspect, full", lattice["full"]),
         row("... cut at the same height", lattice["cut"]),
     ]
+
+    error = max(flood["extent_error"], aspect["extent_error"])
 
     def off(way: dict[str, Any]) -> str:
         return " and ".join(f"{100 * share:+.1f} %" for share in way["off"])
 
     return "\n".join(rows) + (
         f"\n\nThe highest position of o is {1e3 * facts['highest']:.1f} mm. Cut 511 mm below it, X and Y "
-        f"differ from the print by {off(flood)} (grid), {off(aspect)} (grid, one aspect) and "
-        f"{off(lattice)} (lattice)."
+        f"differ from the print by {off(flood)} (pose space), {off(aspect)} (one aspect) and "
+        f"{off(lattice)} (lattice). Sizes in pose space are those of poses found by optimisation, to "
+        f"{1e3 * error:.1g} mm; those of the lattice are of its nodes, inner bounds."
     )

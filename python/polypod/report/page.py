@@ -195,6 +195,7 @@ def _workspace(content: Content) -> dict[str, Any]:
         **({"figure": json.loads(workspace_figure(found, path))} if of_o else {}),
         "picture": figures.workspace_picture(found),
         "extents": tables.extents_table(facts),
+        "extent_limits": tables.extent_limits_table(facts),
         "ends": tables.ends_table(facts),
     }
 

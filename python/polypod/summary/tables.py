@@ -400,17 +400,28 @@ def _passed(leg: Facts, factor: float) -> str:
 
 def extents_table(facts: Facts) -> Table:
     """How far a workspace reaches, from the facts of `Workspace.facts`."""
-    rows = [
-        (
-            name,
-            *(
-                readable(value, coordinate_unit(name))
-                for value in (low, high, high - low, facts["step"][name])
-            ),
-        )
-        for name, (low, high) in facts["extents"].items()
-    ]
+    rows = []
+    for name, (low, high) in facts["extents"].items():
+        unit, (below, above) = coordinate_unit(name), facts["extent_errors"][name]
+        ends = (_exact(low, below, unit), _exact(high, above, unit), _exact(high - low, below + above, unit))
+        rows.append((name, *ends, readable(facts["step"][name], unit)))
     return Table("Extents", ("", "least>", "greatest>", "width>", "step>"), rows, content(facts))
+
+
+def _exact(value: float, error: float, unit: str) -> str:
+    """A value, with its error where that shows."""
+    off = readable(error, unit)
+    return readable(value, unit) + (f" ± {off}" if off != readable(0.0, unit) else "")
+
+
+def extent_limits_table(facts: Facts) -> Table:
+    """What ends a workspace where it reaches farthest."""
+    rows = [
+        (f"{end} {name}", ", ".join(limits))
+        for name, pair in facts["extent_limits"].items()
+        for end, limits in zip(("least", "greatest"), pair, strict=True)
+    ]
+    return Table("What ends the extents", ("", "limits that bind there"), rows)
 
 
 def content(facts: Facts) -> str:

@@ -12,8 +12,10 @@ from polypod import _core
 from polypod.answers.singularity import NEAR_SINGULAR
 from polypod.answers.status import Status
 from polypod.errors import CoordinateError, WorkspaceError, alternatives
-from polypod.files.units import coordinate_unit
+from polypod.files.units import coordinate_unit, readable
 from polypod.mechanism import Mechanism
+from polypod.workspaces.extremes import roomiest
+from polypod.workspaces.pose_search import PoseSearch
 
 Array = NDArray[np.float64]
 Progress = Callable[[int, int], None]
@@ -21,6 +23,9 @@ Progress = Callable[[int, int], None]
 
 MOST_NODES = 10**9
 """Nodes of the largest grid; its mask takes 1 GB."""
+
+ROUNDING = 1e-9
+"""Part of a cell that is none."""
 
 ON_LIMIT = 1e-9
 """By how much, in its unit, a start pose may pass a limit: poses found on one miss it by rounding."""
@@ -61,6 +66,15 @@ class Grid(NamedTuple):
         """(d, 2): ends of the box."""
         low = self.origin - 0.5 * self.steps
         return np.stack([low, low + self.steps * np.array(self.counts)], axis=1)
+
+    def within(self, region: Array) -> Grid:
+        """The cells that a region (d, 2) takes up."""
+        low = self.bounds()[:, 0]
+        ends = (region - low[:, None]) / self.steps[:, None]
+        first = np.clip(np.floor(ends[:, 0] + ROUNDING), 0.0, np.array(self.counts) - 1.0)
+        last = np.clip(np.ceil(ends[:, 1] - ROUNDING), first + 1.0, self.counts)
+        counts = tuple(int(n) for n in last - first)
+        return Grid(self.names, self.origin + self.steps * first, self.steps, counts)
 
 
 def position_bounds(mech: Mechanism) -> Array:
@@ -180,7 +194,7 @@ def grid_of(
         if not (np.isfinite(width) and width > 0.0):
             raise WorkspaceError(f"step of {name} is {width!r}; must be above 0 {coordinate_unit(name)}")
         if cubic:
-            count = max(int(np.ceil((high - low) / width - 1e-9)), 1)
+            count = max(int(np.ceil((high - low) / width - ROUNDING)), 1)
             low = -0.5 * count * width if abs(low + high) < 1e-9 else low
         else:
             count = max(round((high - low) / width), 1)
@@ -188,10 +202,18 @@ def grid_of(
         steps.append(width)
         counts.append(count)
         origin.append(low + 0.5 * width)
-    grid = Grid(names, np.array(origin), np.array(steps), tuple(counts))
+    return Grid(names, np.array(origin), np.array(steps), tuple(counts))
+
+
+def check_size(grid: Grid) -> Grid:
+    """The grid. Raises WorkspaceError for one of too many nodes."""
     if grid.nodes > MOST_NODES:
+        least = grid.steps * (grid.nodes / MOST_NODES) ** (1.0 / len(grid.steps))
+        steps = dict(zip(grid.names, least, strict=True))
+        words = {readable(1.01 * step, coordinate_unit(name)) for name, step in steps.items()}
         raise WorkspaceError(
-            f"step makes a grid of {grid.nodes:.3g} nodes; at most {MOST_NODES:.0e}: widen it"
+            f"step makes a grid of {grid.nodes:.3g} nodes; at most {MOST_NODES:.0e}, with a step of "
+            f"{' and '.join(sorted(words))}"
         )
     return grid
 
@@ -229,7 +251,8 @@ def find_start(mech: Mechanism, bounds: Array, *, regular: bool) -> Array:
 
     The centre pose if it is such a one; else of those found at 7 x 7 x 7 places and home, with rotations next
     to that of home and to six rotated from it by 0.3 rad, the one farthest from its limits, relative to their
-    scales. With `regular`, if the centre pose is nearly singular, the one that is conditioned best.
+    scales. With `regular`, if the centre pose is nearly singular, the one that is conditioned best. Where
+    none is found there, the one that an optimisation from home finds.
 
     Raises WorkspaceError where none is found.
     """
@@ -249,6 +272,8 @@ def find_start(mech: Mechanism, bounds: Array, *, regular: bool) -> Array:
     fitted = _core.fit_poses(mech._core, np.ascontiguousarray(poses).reshape(-1))
     fitted = fitted[np.isfinite(fitted[:, 0, 0])]
     if not len(fitted):
+        fitted = _roomiest(mech, bounds)
+    if not len(fitted):
         raise WorkspaceError(
             f"start: no pose of {mech.name} inside all limits was found in the bounds; give one, or other "
             "bounds"
@@ -262,6 +287,16 @@ def find_start(mech: Mechanism, bounds: Array, *, regular: bool) -> Array:
         else mech.limits(fitted).relative.min(axis=1, initial=1.0)
     )
     return np.asarray(fitted[int(np.argmax(np.nan_to_num(room, nan=-np.inf)))])
+
+
+def _roomiest(mech: Mechanism, bounds: Array) -> Array:
+    """(n, 4, 4): the pose with the most room that optimisation finds from home, if there is one."""
+    search = PoseSearch(mech, mech.home[None], 0, 0, +1, box=bounds, aspect=False)
+    x = roomiest(search, np.zeros(6))
+    if x is None:
+        return np.zeros((0, 4, 4))
+    found = _core.fit_poses(mech._core, np.ascontiguousarray(search.pose(x)).reshape(-1))
+    return np.asarray(found[np.isfinite(found[:, 0, 0])])
 
 
 def _turned(axis: int, angle: float) -> Array:

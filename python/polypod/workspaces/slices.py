@@ -6,37 +6,31 @@ The constant-orientation workspace, the orientation workspace at a point and eve
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import ndimage
 
-from polypod.errors import CoordinateError, WorkspaceError, alternatives
+from polypod.errors import WorkspaceError
+from polypod.files.units import coordinate_unit, readable
 from polypod.mechanism import Mechanism
 from polypod.workspaces.boundary import Cuts, open_edges
-from polypod.workspaces.search_region import Grid, Progress, bounds_of, checked_start, grid_of
-from polypod.workspaces.workspace import (
-    EDGE_OF_GRID,
-    NO_POSE,
-    SINGULARITY,
-    Workspace,
-    enclosed,
-    label_names,
-    with_floor,
-)
+from polypod.workspaces.causes import EDGE_OF_GRID, label_names
+from polypod.workspaces.enclosing import Boundary, enclosed
+from polypod.workspaces.extremes import optimum, roomiest
+from polypod.workspaces.search_region import Grid, Progress, bounds_of, check_size, checked_start, grid_of
+from polypod.workspaces.slice_states import Aspects, SliceSpace, SliceStates
+from polypod.workspaces.workspace import Workspace, with_floor
 
 Array = NDArray[np.float64]
-Aspects = NDArray[np.int8]
+Bounds = Mapping[str, tuple[float, float]]
 
 CELLS = {2: 200, 3: 60}
 """Cells along each of the bounds by default, by the number of coordinates that vary.
 
 Without a step the grid is laid again about what the first found, until that is whole.
 """
-
-TILT = ("x", "y", "z", "azimuth", "tilt", "torsion")
-"""Position of the tool tip, direction of the tool axis in spherical angles, rotation about it [T42]."""
 
 _MARGIN = 3.5
 """Cells that are at least added to what a first grid found."""
@@ -49,74 +43,6 @@ _CHUNK = 50_000
 
 _BISECTIONS = 36
 """Halvings of an edge: 2e-11 of its length remains."""
-
-
-class _Judged(NamedTuple):
-    """States of the nodes of a slice."""
-
-    pose: Array
-    """(n, 4, 4)."""
-    aspect: Aspects
-    """(n,): 0 for a state that is not inside; else 1, or the sign of det J if aspects are kept apart."""
-
-
-class _Slice:
-    """Some coordinates as functions of which states are judged."""
-
-    def __init__(
-        self,
-        mech: Mechanism,
-        vary: Sequence[str],
-        fix: Mapping[str, float],
-        branch: int,
-        start: Array | None,
-        keep_aspect: bool,
-    ) -> None:
-        self.mech, self.vary, self.fix = mech, tuple(vary), dict(fix)
-        self.branch, self.start, self.keep_aspect = branch, start, keep_aspect
-        self.tilted = _check_names(mech, self.vary, self.fix)
-
-    def states(self, values: Array) -> tuple[Array, NDArray[np.uint8]]:
-        """Poses (n, 4, 4) and status of values (n, d)."""
-        given: dict[str, ArrayLike] = dict(zip(self.vary, values.T, strict=True)) | self.fix
-        if self.tilted:
-            given = _tool(given)
-        state = self.mech.state(given, branch=self.branch, guess=self.start)
-        return state.pose, state.status
-
-    def judge(self, values: Array) -> _Judged:
-        """Which values (n, d) are inside: they have a pose, and it keeps all limits."""
-        pose, _ = self.states(values)
-        inside = self.mech.limits(pose).within
-        if not self.keep_aspect:
-            return _Judged(pose, inside.astype(np.int8))
-        sign = np.sign(self.mech.determinant(pose).determinant)
-        return _Judged(pose, np.where(inside & np.isfinite(sign), sign, 0).astype(np.int8))
-
-    def coordinates(self, pose: Array) -> Array:
-        """(d,): the values of a pose."""
-        if not self.tilted:
-            chosen = self.mech.coordinates(
-                pose, self.mech._set_of(dict.fromkeys((*self.vary, *self.fix), 0.0))
-            )
-        else:
-            tool = self.mech.coordinates(pose, "tool")
-            x, y, z = (tool[f"axis_{k}"] for k in "xyz")
-            chosen = {k: tool[f"tip_{k}"] for k in "xyz"}
-            chosen["azimuth"], chosen["tilt"] = np.arctan2(y, x), np.arctan2(np.hypot(x, y), z)
-            chosen["torsion"] = tool.get("turn", np.asarray(np.nan))
-        return np.array([float(chosen[name]) for name in self.vary])
-
-    def stops(self, values: Array) -> NDArray[np.int64]:
-        """For values just outside, the index of what ends the workspace there, in `label_names`."""
-        names = label_names(self.mech)
-        pose, _ = self.states(values)
-        limits = self.mech.limits(pose)
-        result = np.full(len(values), names.index(SINGULARITY))
-        result[~np.isfinite(pose[:, 0, 0])] = names.index(NO_POSE)
-        passed = ~limits.within & (limits.binding >= 0) & np.isfinite(pose[:, 0, 0])
-        result[passed] = limits.binding[passed]
-        return result
 
 
 def sliced(
@@ -135,10 +61,17 @@ def sliced(
     """The values that two or three coordinates can take together; see `polypod.workspace`."""
     mech = with_floor(mech, sigma_min)
     pose = None if start is None else checked_start(mech, start)
-    cut = _Slice(mech, vary, fix or {}, branch, pose, keep_aspect)
+    cut = SliceStates(mech, vary, fix or {}, branch, pose, keep_aspect)
     box = bounds_of(mech, cut.vary, bounds)
-    grid = grid_of(box, step, CELLS[len(cut.vary)])
-    mask, aspect = _component(cut, grid, _evaluate(cut, grid, progress))
+    grid = check_size(grid_of(box, step, CELLS[len(cut.vary)]))
+    aspects = _evaluate(cut, grid, progress)
+    if not aspects.any():
+        region = _region(cut, box)
+        if step is not None or region is None:
+            raise WorkspaceError(_nothing_inside(grid, region))
+        grid = grid_of(region, None, CELLS[len(cut.vary)])
+        aspects = _evaluate(cut, grid, progress)
+    mask, aspect = _component(cut, grid, aspects)
     if step is None:
         for _ in range(_ZOOMS):
             closer = _around(grid, mask, box, bounds or {})
@@ -154,46 +87,48 @@ def sliced(
         "keep_aspect": keep_aspect,
         "sigma_min": sigma_min,
     }
-    return enclosed("slice", mech, grid, mask, cuts, labels, poses, inputs)
+
+    def space(boundary: Boundary) -> SliceSpace:
+        return SliceSpace(cut, boundary.values, grid.bounds(), aspect)
+
+    return enclosed("slice", mech, grid, mask, cuts, labels, poses, inputs, space)
 
 
-def _check_names(mech: Mechanism, vary: tuple[str, ...], fix: Mapping[str, float]) -> bool:
-    """Whether the names are those of `TILT`. Raises for names that make up no coordinates."""
-    if len(vary) not in CELLS or len({*vary}) < len(vary):
-        raise WorkspaceError(
-            f"vary is {', '.join(vary) or 'empty'}; needs two or three different coordinates"
-        )
-    if twice := {*vary} & {*fix}:
-        raise WorkspaceError(f"fix.{min(twice)}: varies, and cannot be fixed")
-    for name, value in fix.items():
-        if not np.isfinite(np.float64(value)):
-            raise WorkspaceError(f"fix.{name} is {value!r}; must be a finite number, m or rad")
-    names = {*vary, *fix}
-    if not names & {*TILT[3:]}:
-        mech._set_of(dict.fromkeys((*vary, *fix), 0.0))
-        return False
-    if "tool" not in mech.coordinate_sets:
-        raise CoordinateError(f"{mech.name} has no tool axis to tilt: that needs 5 or 6 degrees of freedom")
-    needed = TILT[: mech.dof]
-    if names != {*needed}:
-        wrong = [n for n in (*vary, *fix) if n not in needed]
-        hint = f"; {wrong[0]!r} is none: {alternatives(wrong[0], needed)}" if wrong else ""
-        raise CoordinateError(f"tilt and torsion need all of {', '.join(needed)}, varied or fixed{hint}")
-    return True
+def _region(cut: SliceStates, box: Bounds) -> Bounds | None:
+    """Bounds about the ends that optimisation from home or the start finds; none where nothing is inside."""
+    sides = np.array(list(box.values()))
+    home = cut.coordinates(cut.mech.home if cut.start is None else cut.start)
+    about = SliceSpace(cut, np.clip(home, *sides.T)[None], sides, +1, size=np.ptp(sides, axis=1))
+    first = about.search(0, +1, 0)
+    x = roomiest(first, np.zeros(len(box))) if np.isfinite(home).all() else None
+    if x is None:
+        return None
+    inside = SliceSpace(cut, first.values(x)[None], sides, +1, size=np.ptp(sides, axis=1))
+    ends = np.repeat(inside.boundary.T, 2, axis=1)
+    for k in range(len(box)):
+        for end, sense in enumerate((-1, 1)):
+            search = inside.search(k, sense, 0)
+            found = optimum(search)
+            if found is not None:
+                ends[k, end] = sense * max(sense * ends[k, end], sense * search.value(found))
+    more = 0.2 * np.ptp(ends, axis=1)
+    low, high = np.maximum(ends[:, 0] - more, sides[:, 0]), np.minimum(ends[:, 1] + more, sides[:, 1])
+    return None if (low >= high).any() else dict(zip(box, zip(low, high, strict=True), strict=True))
 
 
-def _tool(given: Mapping[str, ArrayLike]) -> dict[str, ArrayLike]:
-    """The tool coordinates of azimuth, tilt and torsion [T42]."""
-    azimuth, tilt = (np.asarray(given[name], dtype=np.float64) for name in ("azimuth", "tilt"))
-    tool = {f"tip_{k}": given[k] for k in "xyz"}
-    tool["axis_x"], tool["axis_y"] = np.sin(tilt) * np.cos(azimuth), np.sin(tilt) * np.sin(azimuth)
-    tool["axis_z"] = np.cos(tilt)
-    if "torsion" in given:
-        tool["turn"] = given["torsion"]
-    return tool
+def _nothing_inside(grid: Grid, region: Bounds | None) -> str:
+    """That no node is inside, and bounds that hold some, if they are known."""
+    told = f"no node of the grid of {' x '.join(map(str, grid.counts))} is inside all limits"
+    if region is None:
+        return f"{told}: other fixed values, or other bounds, may help"
+    steps = (
+        f"{name} {readable((high - low) / CELLS[len(region)], coordinate_unit(name))}"
+        for name, (low, high) in region.items()
+    )
+    return f"{told}; with steps of {', '.join(steps)} some are, or without a step"
 
 
-def _evaluate(cut: _Slice, grid: Grid, progress: Progress | None) -> Aspects:
+def _evaluate(cut: SliceStates, grid: Grid, progress: Progress | None) -> Aspects:
     """The aspect of every node, flat."""
     axes = grid.axes()
     result = np.zeros(grid.nodes, dtype=np.int8)
@@ -207,7 +142,7 @@ def _evaluate(cut: _Slice, grid: Grid, progress: Progress | None) -> Aspects:
     return result
 
 
-def _component(cut: _Slice, grid: Grid, aspects: Aspects) -> tuple[NDArray[np.bool_], int]:
+def _component(cut: SliceStates, grid: Grid, aspects: Aspects) -> tuple[NDArray[np.bool_], int]:
     """The connected nodes of one aspect with the start, or without a start the most; and the aspect."""
     shaped = aspects.reshape(grid.counts)
     found = [(np.asarray(ndimage.label(shaped == aspect)[0]), aspect) for aspect in (1, -1)]
@@ -215,10 +150,7 @@ def _component(cut: _Slice, grid: Grid, aspects: Aspects) -> tuple[NDArray[np.bo
         sizes = [np.bincount(labels.ravel())[1:] for labels, _ in found]
         best = max(range(2), key=lambda i: sizes[i].max(initial=0))
         if not len(sizes[best]):
-            raise WorkspaceError(
-                f"no node of the grid of {' x '.join(map(str, grid.counts))} is inside all limits: other "
-                "fixed values, other bounds or a smaller step may help"
-            )
+            raise WorkspaceError(_nothing_inside(grid, None))
         labels, aspect = found[best]
         return labels == 1 + int(np.argmax(sizes[best])), aspect
     values = cut.coordinates(cut.start)
@@ -261,7 +193,7 @@ def _named(names: Sequence[str], values: Array) -> str:
 
 
 def _bisect(
-    cut: _Slice, grid: Grid, mask: NDArray[np.bool_], aspect: int
+    cut: SliceStates, grid: Grid, mask: NDArray[np.bool_], aspect: int
 ) -> tuple[Cuts, NDArray[np.int64], Array]:
     """The cuts of all open edges, what ends the workspace there, and the last poses."""
     node, direction = open_edges(mask)

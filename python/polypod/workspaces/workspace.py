@@ -21,8 +21,8 @@ from polypod.errors import WorkspaceError
 from polypod.files.text import replacing
 from polypod.files.units import coordinate_unit, readable
 from polypod.mechanism import Mechanism
-from polypod.workspaces.boundary import Cuts, content_with_error, surface
-from polypod.workspaces.search_region import Grid
+from polypod.workspaces.causes import EDGE_OF_GRID, NO_POSE, SINGULARITY
+from polypod.workspaces.extremes import Extremes
 
 if TYPE_CHECKING:
     import trimesh
@@ -30,16 +30,10 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
-SINGULARITY, EDGE_OF_GRID, NO_POSE = "singularity", "edge of grid", "no pose"
-"""Causes of a workspace's boundary other than limits.
-
-Beyond, the sign of det J changes; the grid ends; no pose was found.
-"""
-
 SUFFIXES = (".stl", ".ply", ".nc", ".glb")
 """Of files that a workspace is saved to."""
 
-_FORMAT = "polypod workspace 1"
+_FORMAT = "polypod workspace 2"
 
 WHITE = "#FFFFFF"
 
@@ -70,10 +64,12 @@ class Workspace:
     """Limits as in `mech.limit_list`, then singularity, edge of grid, no pose."""
     poses: Array
     """(v, 4, 4): a pose at each vertex, on the limit."""
+    extremes: Extremes
+    """The ends along each coordinate, with their errors, limits and poses [T76]."""
     volume: float
     """Of the mesh, or its area in two dimensions, in the product of the units."""
     volume_error: float
-    """Its estimated error [T43]."""
+    """Its estimated error: by coarser grids and by places tried at random [T43]."""
     inputs: dict[str, Any]
     """Inputs: mechanism, bounds, step, start and the rest."""
 
@@ -90,8 +86,8 @@ class Workspace:
 
     @property
     def extents(self) -> Array:
-        """(d, 2): least and greatest coordinate on the boundary."""
-        return np.stack([self.vertices.min(axis=0), self.vertices.max(axis=0)], axis=1)
+        """(d, 2): least and greatest value of each coordinate, m and rad."""
+        return self.extremes.values
 
     @cached_property
     def shares(self) -> dict[str, float]:
@@ -124,6 +120,11 @@ class Workspace:
             "nodes": int(self.mask.size),
             "inside": int(self.mask.sum()),
             "extents": dict(zip(self.names, self.extents.tolist(), strict=True)),
+            "extent_errors": dict(zip(self.names, self.extremes.errors.tolist(), strict=True)),
+            "extent_limits": {
+                name: [list(low), list(high)]
+                for name, (low, high) in zip(self.names, self.extremes.limits, strict=True)
+            },
             "volume": self.volume,
             "volume_error": self.volume_error,
             "volume_unit": self.volume_unit,
@@ -144,12 +145,20 @@ class Workspace:
             "faces": (("face", "corner"), self.faces.astype(np.int32), {"long_name": "vertices of faces"}),
             "label": ("vertex", self.labels.astype(np.int32), {"long_name": "what ends the workspace"}),
             "pose": (("vertex", "row", "column"), self.poses, {"long_name": "pose at the vertex"}),
+            "extents": (("coordinate", "end"), self.extents, {"long_name": "least and greatest"}),
+            "extent_errors": (("coordinate", "end"), self.extremes.errors, {"long_name": "how much farther"}),
+            "extent_pose": (
+                ("coordinate", "end", "row", "column"),
+                self.extremes.poses,
+                {"long_name": "pose at the end"},
+            ),
             "volume": ((), self.volume, {"units": self.volume_unit}),
             "volume_error": ((), self.volume_error, {"units": self.volume_unit}),
         }
         attributes = {
             "kind": self.kind,
             "label_names": json.dumps(self.label_names, ensure_ascii=False),
+            "extent_limits": json.dumps(self.extremes.limits, ensure_ascii=False),
             "inputs": json.dumps(self.inputs, ensure_ascii=False),
             "polypod_version": _core.__version__,
         }
@@ -165,10 +174,9 @@ class Workspace:
 
     def _repr_html_(self) -> str:
         """Extents, size, and what ends it at which share of the boundary."""
-        pairs = zip(self.names, self.extents.tolist(), self.units, strict=True)
         extents = [
             (name, *(readable(value, unit) for value in (low, high, high - low)))
-            for name, (low, high), unit in pairs
+            for name, (low, high), unit in zip(self.names, self.extents.tolist(), self.units, strict=True)
         ]
         ends = [(name, f"{100 * share:.1f} %") for name, share in self.shares.items()]
         return card(
@@ -297,53 +305,18 @@ def load_workspace(path: str | PathLike[str]) -> Workspace:
             labels=data["label"].to_numpy().astype(np.int64),
             label_names=tuple(json.loads(data.attrs["label_names"])),
             poses=data["pose"].to_numpy(),
+            extremes=Extremes(
+                data["extents"].to_numpy(),
+                data["extent_errors"].to_numpy(),
+                tuple((tuple(low), tuple(high)) for low, high in json.loads(data.attrs["extent_limits"])),
+                data["extent_pose"].to_numpy(),
+            ),
             volume=float(data["volume"]),
             volume_error=float(data["volume_error"]),
             inputs=json.loads(data.attrs["inputs"]),
         )
     except Exception as error:  # whatever a damaged file makes of the libraries that read it
         raise WorkspaceError(f"{path} is no whole Polypod workspace: {error}") from error
-
-
-def enclosed(
-    kind: str,
-    mech: Mechanism,
-    grid: Grid,
-    mask: NDArray[np.bool_],
-    cuts: Cuts,
-    labels: Indices,
-    poses: Array,
-    inputs: dict[str, Any],
-) -> Workspace:
-    """The workspace of a mask and the cuts around it; labels and poses are those of the cuts."""
-    shape = surface(mask, cuts)
-    cell = float(np.prod(grid.steps))
-    volume, error = content_with_error(mask, cuts, shape)
-    return Workspace(
-        kind=kind,
-        names=grid.names,
-        axes=grid.axes(),
-        mask=mask,
-        vertices=grid.origin + grid.steps * shape.places,
-        faces=shape.faces,
-        labels=labels[shape.cut],
-        label_names=label_names(mech),
-        poses=poses[shape.cut],
-        volume=cell * volume,
-        volume_error=cell * error,
-        inputs={
-            "mechanism": mech.name,
-            "mechanism_file": mech.to_toml(),
-            "bounds": dict(zip(grid.names, grid.bounds().tolist(), strict=True)),
-            "step": dict(zip(grid.names, grid.steps.tolist(), strict=True)),
-            **inputs,
-        },
-    )
-
-
-def label_names(mech: Mechanism) -> tuple[str, ...]:
-    """Possible causes of a workspace's boundary."""
-    return (*(limit.name for limit in mech.limit_list), SINGULARITY, EDGE_OF_GRID, NO_POSE)
 
 
 def with_floor(mech: Mechanism, sigma_min: float | None) -> Mechanism:

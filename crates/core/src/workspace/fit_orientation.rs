@@ -88,13 +88,17 @@ pub fn fit(mech: &Mechanism, pose: &Pose<f64>, o: Vec3<f64>) -> Option<Pose<f64>
     None
 }
 
-/// The derivative of a limit's margin by a rotation of the platform about o, by duals.
+/// The derivative of a limit's margin along a twist, by duals; none for those that are no function of the
+/// pose alone in closed form.
+#[must_use]
+pub fn margin_rate(mech: &Mechanism, limit: &Limit, pose: &Pose<f64>, twist: &Twist<f64>) -> Option<f64> {
+    Some(limit.bound.margin(limit.geometric(mech, &pose.along(twist))?).d)
+}
+
+/// The derivative of a limit's margin by a rotation of the platform about o.
 fn gradient(mech: &Mechanism, limit: &Limit, pose: &Pose<f64>) -> Vec3<f64> {
-    let along = |axis: Vec3<f64>| {
-        let turning = pose.along(&Twist::new(Vec3::zero(), axis));
-        limit.geometric(mech, &turning).map_or(0.0, |value| limit.bound.margin(value).d)
-    };
-    Vec3::new(along(Vec3::X), along(Vec3::Y), along(Vec3::Z))
+    let about = |axis| margin_rate(mech, limit, pose, &Twist::new(Vec3::zero(), axis)).unwrap_or(0.0);
+    Vec3::new(about(Vec3::X), about(Vec3::Y), about(Vec3::Z))
 }
 
 /// Whether no leg points backwards and a pose keeps the limits of conditioning and force; the latter at rest
@@ -109,7 +113,8 @@ fn checked(mech: &Mechanism, pose: &Pose<f64>) -> bool {
     forwards && mech.limits.iter().filter(checked).all(kept)
 }
 
-fn forces_at_rest(mech: &Mechanism, pose: &Pose<f64>) -> Vec<f64> {
+/// Active forces at rest under the mechanism's own load, N.
+pub(crate) fn forces_at_rest(mech: &Mechanism, pose: &Pose<f64>) -> Vec<f64> {
     let rest = Motion { pose: *pose, twist: Twist::zero(), acceleration: Acceleration::zero() };
     let load = inverse_dynamics::load_in_base(mech.load.wrench, mech.load.axes, pose);
     let mut solver = ForceSolver::new(mech);

@@ -255,10 +255,25 @@ pub enum Stop {
 /// A pose at `o` from one nearby, if there is one, at once or in pieces; with the sign of det J kept at the
 /// end of each piece, if it is given.
 fn moved(mech: &Mechanism, pose: &Pose<f64>, o: Vec3<f64>, kept: Option<f64>) -> Option<Pose<f64>> {
-    let step =
-        |pose: &Pose<f64>, o| fit(mech, pose, o).filter(|p| kept.is_none_or(|kept| sign(mech, p) == kept));
+    let step = |pose: &Pose<f64>, o| fit_in_aspect(mech, pose, o, kept);
     let at_once = if kept.is_none() { step(pose, o) } else { None };
     at_once.or_else(|| in_pieces(pose, o, PIECES, step))
+}
+
+/// The fitted pose at `o`, with the sign of det J kept if it is given.
+fn fit_in_aspect(mech: &Mechanism, pose: &Pose<f64>, o: Vec3<f64>, kept: Option<f64>) -> Option<Pose<f64>> {
+    fit(mech, pose, o).filter(|p| kept.is_none_or(|kept| sign(mech, p) == kept))
+}
+
+/// The poses at given places of o that are reached from given ones on straight ways of o in small pieces; with
+/// the sign of det J kept, if it must be.
+#[must_use]
+pub fn led(mech: &Mechanism, ways: &[(Pose<f64>, Vec3<f64>)], keep_aspect: bool) -> Vec<Option<Pose<f64>>> {
+    let lead = |(pose, o): &(Pose<f64>, Vec3<f64>)| {
+        let kept = keep_aspect.then(|| sign(mech, pose));
+        in_pieces(pose, *o, SMALL_PIECES, |pose, o| fit_in_aspect(mech, pose, o, kept))
+    };
+    ways.par_iter().map(lead).collect()
 }
 
 /// The pose at the end of a straight way of o, step by step.

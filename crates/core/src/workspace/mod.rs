@@ -3,3 +3,4 @@ pub mod flood_fill;
 pub mod lattice_poses;
 pub mod lattice_steps;
 pub mod length_lattice;
+pub mod pose_bounds;
