@@ -6,6 +6,7 @@ import re
 
 import numpy as np
 import pytest
+from scipy import ndimage
 from scipy.optimize import linprog, minimize
 from scipy.spatial.transform import Rotation
 
@@ -154,6 +155,42 @@ def test_ends_are_those_of_an_independent_optimiser(name, axis):
     length = distances(mech, found.extremes.poses[axis])
     assert (length >= mech.stroke[:, 0] - 1e-9).all()
     assert (length <= mech.stroke[:, 1] + 1e-9).all()
+
+
+@pytest.mark.parametrize("name", ["4pss-upu", "linapod", "3-puu", "4ups-up", "exechon", "pentapod-5-ups"])
+def test_every_kind_of_machine_has_exact_ends(name):
+    """Sliders, whose carriages stop at dead positions, redundant actuators, passive legs, free spins."""
+    mech = pp.load(name)
+    found = pp.workspace(mech)
+    size = np.ptp(found.extents, axis=1)
+    assert (found.extremes.errors < 1e-6 * size[:, None]).all()
+    assert (found.extents[:, 0] < found.vertices.min(axis=0) + 1e-7).all()
+    assert (found.extents[:, 1] > found.vertices.max(axis=0) - 1e-7).all()
+    limits = mech.limits(found.extremes.poses)
+    regular = limits.status == pp.Status.OK  # margins at a dead position are not determined
+    assert regular.sum() >= 4
+    assert limits.margins[regular].min() > -1e-9
+    if mech.redundantly_actuated:  # det JᵀJ has one sign: there is one aspect
+        assert np.allclose(pp.workspace(mech, keep_aspect=True).extents, found.extents, atol=1e-7, rtol=0)
+
+
+def test_another_aspect_behind_a_singularity_does_not_count():
+    """3-PUU: places with one sign of det J make up components; that of the start has the volume."""
+    mech = pp.load("3-puu")
+    found = pp.workspace(mech, keep_aspect=True)
+    finer = [axis[0] + (axis[1] - axis[0]) * np.arange(-0.5, len(axis), 0.5) for axis in found.axes]
+    places = np.stack(np.meshgrid(*finer, indexing="ij"), axis=-1)
+    poses = np.tile(mech.home, (*places.shape[:-1], 1, 1))
+    poses[..., :3, 3] = places
+    inside = mech.limits(poses).within & (places[..., 2] >= found.inputs["bounds"]["z"][0])
+    sign = np.sign(mech.determinant(poses).determinant)
+    start = np.array(found.inputs["start"])
+    parts, _ = ndimage.label(inside & (sign == np.sign(mech.determinant(start).determinant)))
+    at = tuple(int(np.argmin(np.abs(axis - o))) for axis, o in zip(finer, start[:3, 3], strict=True))
+    cell = np.prod([axis[1] - axis[0] for axis in finer])
+    volume = cell * np.count_nonzero(parts == parts[at])
+    assert found.volume == pytest.approx(volume, abs=found.volume_error + 0.005 * volume)
+    assert found.volume_error < 0.05 * volume
 
 
 def test_the_published_manipulator_spans_what_an_audit_found(lu):

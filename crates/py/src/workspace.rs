@@ -72,21 +72,33 @@ pub fn lead_poses<'py>(
     PyArray1::from_vec(py, led).reshape([n, 4, 4])
 }
 
-/// What bounds a pose: values (n,), and their derivatives (n, 6) by v and ω in base axes, of the constraints,
-/// the limits, the legs' directions, and det J.
+/// What bounds a pose: values (n,), and their derivatives (n, 6 + k) by v and ω in base axes and by the k
+/// coordinates of drives that move their foot, of the constraints, the limits, the legs' directions, and det J.
 #[pyfunction]
 pub fn pose_bounds<'py>(
     py: Python<'py>,
     mech: &Bound<'py, PyMechanism>,
     pose: Array<'py>,
+    coordinates: Array<'py>,
 ) -> PyResult<Bound<'py, PyDict>> {
-    let bounds = PoseBounds::at(mech.get().core(), &start_pose(&pose)?);
+    let (core, coordinates) = (mech.get().core(), slice(&coordinates)?);
+    let k = core.legs.iter().filter(|leg| leg.drive.moves_foot()).count();
+    if coordinates.len() != k {
+        return Err(PyValueError::new_err(format!("needs the coordinates of {k} legs")));
+    }
+    let bounds = PoseBounds::at(core, &start_pose(&pose)?, coordinates);
     let result = PyDict::new(py);
     let enter = |name: &str, of: &[Bounded]| {
         let values: Vec<f64> = of.iter().map(|b| b.value).collect();
-        let rows: Vec<f64> =
-            of.iter().flat_map(|b| [b.row.force.array(), b.row.torque.array()].concat()).collect();
-        let rows = PyArray1::from_vec(py, rows).reshape([of.len(), 6])?;
+        let mut rows = Vec::with_capacity(of.len() * (6 + k));
+        for bounded in of {
+            rows.extend(bounded.row.force.array());
+            rows.extend(bounded.row.torque.array());
+            rows.extend(
+                (0..k).map(|i| bounded.by_coordinate.map_or(0.0, |(of, d)| if of == i { d } else { 0.0 })),
+            );
+        }
+        let rows = PyArray1::from_vec(py, rows).reshape([of.len(), 6 + k])?;
         result.set_item(name, (PyArray1::from_vec(py, values), rows))
     };
     enter("constraints", &bounds.constraints)?;

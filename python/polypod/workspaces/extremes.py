@@ -30,6 +30,9 @@ _STEPS = 200
 _CONVERGED = 1e-14
 """Of the search: the most steps, and the gain, as a part of the scale, below which it ends."""
 
+_FAR = 1e3
+"""By how much all bounds are missed where they are not determined, in their scales."""
+
 _LEVELS = 24
 """Of a way through the inside: places between its ends."""
 
@@ -73,6 +76,8 @@ class Search(Protocol):
 
     names: Names
     """(p,): of what must not be below zero."""
+    least: Array
+    """(p,): by how much each is kept above what it need not be below."""
     scale: float
     """Unit of the objective, m or rad."""
     box: Array
@@ -166,7 +171,7 @@ def _end(search: Search, size: float) -> End | None:
         pose = None if ridge is None else search.reached(np.concatenate([ridge, x[None]]))
     if pose is None:
         return None
-    error = _left(search, bounded, x) * search.scale + _UNCERTAIN * size
+    error = _missing(search, bounded, x) * search.scale + _UNCERTAIN * size
     return End(search.value(x), error, _binding(search, bounded, x), pose)
 
 
@@ -219,19 +224,29 @@ def _wider(rows: Array, last: float) -> Array:
 
 
 def _remembered(search: Search) -> Callable[[Array], Bounded]:
-    """What bounds a place, worked out once for each in turn; raises where it is not determined."""
+    """What bounds a place, worked out once for each in turn.
+
+    Where it is not determined, all is missed by much, so that the search turns back; raises if it never was.
+    """
     seen: list[tuple[bytes, Bounded]] = []
 
     def at(x: Array) -> Bounded:
         if not seen or seen[0][0] != x.tobytes():
             bounded = search.at(x)
-            known = bounded is not None and all(np.isfinite(part).all() for part in chain(*bounded[:2]))
-            if bounded is None or not known:
-                raise _Undetermined
+            if bounded is None or not all(np.isfinite(part).all() for part in chain(*bounded[:2])):
+                if not seen:
+                    raise _Undetermined
+                bounded = _far_outside(seen[0][1])
             seen[:] = [(x.tobytes(), bounded)]
         return seen[0][1]
 
     return at
+
+
+def _far_outside(last: Bounded) -> Bounded:
+    """What stands for a place that is not determined, after the last one."""
+    (zero, zeros), (positive, rows), objective = last
+    return Bounded((np.full_like(zero, _FAR), zeros), (np.full_like(positive, -_FAR), rows), objective)
 
 
 def _maximum(at: Callable[[Array], Bounded], begin: Array, box: Array) -> Array | None:
@@ -264,7 +279,7 @@ def _maximum(at: Callable[[Array], Bounded], begin: Array, box: Array) -> Array 
     except _Undetermined:
         return None
     x = np.asarray(found.x)
-    return x if np.isfinite(x).all() else None
+    return x if np.isfinite(x).all() and at(x).positive[0].min(initial=0.0) > -_FAR else None
 
 
 def between(way: Array, pieces: int) -> Array:
@@ -282,14 +297,20 @@ def _active(search: Search, bounded: Bounded, x: Array) -> tuple[NDArray[np.intp
     )
 
 
-def _left(search: Search, bounded: Bounded, x: Array) -> float:
-    """What may be gained, to first order: the derivative that no multipliers balance, by the way gone."""
+def _missing(search: Search, bounded: Bounded, x: Array) -> float:
+    """What may be gained, to first order, by the multipliers of what binds.
+
+    That is the derivative that they do not balance, by the way gone; and what bounds are kept by.
+    """
     binding, sides = _active(search, bounded, x)
     zero = bounded.zero[1]
     rows = np.concatenate([bounded.positive[1][binding], sides, zero, -zero])
     gradient = bounded.objective[1]
-    rest = nnls(rows.T, -gradient)[1] if len(rows) else float(np.linalg.norm(gradient))
-    return float(rest) * float(np.linalg.norm(x))
+    if not len(rows):
+        return float(np.linalg.norm(gradient) * np.linalg.norm(x))
+    multipliers, rest = nnls(rows.T, -gradient)
+    kept = float(multipliers[: len(binding)] @ search.least[binding])
+    return float(rest) * float(np.linalg.norm(x)) + kept
 
 
 def _binding(search: Search, bounded: Bounded, x: Array) -> Names:

@@ -18,7 +18,7 @@ INSIDE = 1e-10
 """Margin, relative to its scale, by which limits are kept: rounding of fitted poses."""
 
 AHEAD = 1e-6
-"""How far legs reach ahead at least, in characteristic lengths."""
+"""How far legs reach ahead at least, in characteristic lengths, and the least δ·d of a drive."""
 
 _PIECES = 33
 """Places between two poses at which the way is tried."""
@@ -78,8 +78,11 @@ class PoseSpace:
             signs = (np.sign(self.mech.determinant(of).determinant) for of in (there, self.boundary[:1]))
             found &= np.equal(*signs)
         left, there = left[found], there[found]
-        back = np.isfinite(self._open(there, poses[left, :3, 3])[:, 0, 0])
-        ends[left[back]] = there[back]
+        back = self._open(there, poses[left, :3, 3])
+        for i in np.flatnonzero(np.isfinite(back[:, 0, 0])):
+            # At the place that it came from, the platform may be rotated otherwise.
+            if last_of(self.mech, straight(back[i], poses[left[i]]), aspect=self.aspect) is not None:
+                ends[left[i]] = there[i]
         return ends
 
     def _open(self, poses: Array, points: Array) -> Array:
@@ -89,7 +92,11 @@ class PoseSpace:
 
 
 class PoseSearch:
-    """Poses about one of the boundary, as a translation in characteristic lengths and a rotation vector."""
+    """Poses about one of the boundary, as a translation in characteristic lengths and a rotation vector.
+
+    Coordinates of drives that move their foot are variables of their own, in characteristic lengths: at dead
+    positions they are no smooth functions of the pose.
+    """
 
     def __init__(
         self, mech: Mechanism, boundary: Array, start: int, axis: int, sense: int, *, box: Array, aspect: bool
@@ -98,44 +105,50 @@ class PoseSearch:
         self.mech, self._boundary, self._start = mech, boundary, boundary[start]
         self.scale = mech.characteristic_length
         self._axis = axis
-        self._objective = np.zeros(6)
+        lengths = mech.inverse_kinematics(self._start).lengths[mech.moves_feet]
+        # Where a strut does not reach its rail, its carriage is next to it.
+        self._coordinates = np.where(np.isfinite(lengths), lengths, 0.0)
+        self._objective = np.zeros(6 + len(lengths))
         self._objective[axis] = sense
         room = (box - self._start[:3, 3:]) / self.scale
-        self.box = np.concatenate([room, np.tile([-np.inf, np.inf], (3, 1))])
+        self.box = np.concatenate([room, np.tile([-np.inf, np.inf], (3 + len(lengths), 1))])
+        bounds = self._bounds(np.zeros(6 + len(lengths)))
+        det = float(bounds["determinant"][0][0])
+        # That of redundant actuation, of JᵀJ, has one sign.
+        self._det = det if aspect and np.isfinite(det) else None
         limits = [limit.name for limit in mech.limit_list]
-        ahead = len(self._bounds(self._start)["ahead"][0])
-        self.names = (*limits, *[NO_POSE] * ahead, *[SINGULARITY] * aspect)
-        self._det = float(self._bounds(self._start)["determinant"][0][0]) if aspect else None
+        others = len(bounds["ahead"][0]), int(self._det is not None)
+        self.names = (*limits, *[NO_POSE] * others[0], *[SINGULARITY] * others[1])
+        self.least = np.repeat([INSIDE, AHEAD, INSIDE], [len(limits), *others])
 
     def pose(self, x: Array) -> Array:
-        """(4, 4): the pose at variables (6,)."""
+        """(4, 4): the pose at variables (6 + k,)."""
         pose: Array = self._start.copy()
         pose[:3, 3] += self.scale * x[:3]
-        pose[:3, :3] = Rotation.from_rotvec(x[3:]).as_matrix() @ pose[:3, :3]
+        pose[:3, :3] = Rotation.from_rotvec(x[3:6]).as_matrix() @ pose[:3, :3]
         return pose
 
-    def _bounds(self, pose: Array) -> dict[str, tuple[Array, Array]]:
+    def _bounds(self, x: Array) -> dict[str, tuple[Array, Array]]:
         bounds: dict[str, tuple[Array, Array]] = _core.pose_bounds(
-            self.mech._core, np.ascontiguousarray(pose).reshape(-1)
+            self.mech._core,
+            np.ascontiguousarray(self.pose(x)).reshape(-1),
+            self._coordinates + self.scale * x[6:],
         )
         return bounds
 
     def at(self, x: Array) -> Bounded:
         """What bounds the pose."""
-        bounds = self._bounds(self.pose(x))
-        by_x = np.zeros((6, 6))
-        by_x[:3, :3] = self.scale * np.eye(3)
-        by_x[3:, 3:] = left_jacobian(x[3:])
+        bounds = self._bounds(x)
+        by_x = self.scale * np.eye(len(x))
+        by_x[3:6, 3:6] = left_jacobian(x[3:6])
         positive = [bounds["limits"], bounds["ahead"]]
-        least = [INSIDE, AHEAD]
         if self._det is not None:
             value, row = bounds["determinant"]
             positive.append((value / self._det, row / self._det))
-            least.append(INSIDE)
         return Bounded(
             (bounds["constraints"][0], bounds["constraints"][1] @ by_x),
             (
-                np.concatenate([value - margin for (value, _), margin in zip(positive, least, strict=True)]),
+                np.concatenate([value for value, _ in positive]) - self.least,
                 np.concatenate([row for _, row in positive]) @ by_x,
             ),
             (float(self._objective @ x), self._objective),
@@ -151,28 +164,36 @@ class PoseSearch:
         Without a place between, the way from poses of the boundary nearby is tried, too.
         """
         if len(way) > 2:
-            return self._through(np.stack([self.pose(x) for x in between(way, _PIECES)]))
+            way = np.stack([self.pose(x) for x in between(way, _PIECES)])
+            return last_of(self.mech, way, aspect=self._det is not None)
         end = self.pose(way[-1])
         turns = end[:3, :3] @ self._boundary[:, :3, :3].transpose(0, 2, 1)
         apart = Rotation.from_matrix(turns).magnitude()
         apart += np.linalg.norm(end[:3, 3] - self._boundary[:, :3, 3], axis=1) / self.scale
         starts = [self._start, *self._boundary[np.argsort(apart, kind="stable")[:_NEARBY]]]
-        ways = (_straight(start, end) for start in starts)
-        return next((pose for way in ways if (pose := self._through(way)) is not None), None)
+        for start in starts:
+            pose = last_of(self.mech, straight(start, end), aspect=self._det is not None)
+            if pose is not None:
+                return pose
+        return None
 
-    def _through(self, way: Array) -> Array | None:
-        """The last pose of a way (w, 4, 4) if poses inside all limits lie next to all of it; else none."""
-        fitted = _core.fit_poses(self.mech._core, np.ascontiguousarray(way).reshape(-1))
-        if not np.isfinite(fitted).all() or (_turns(fitted) > _turns(way) + _JUMP).any():
+
+def last_of(mech: Mechanism, way: Array, *, aspect: bool) -> Array | None:
+    """The last pose of a way (w, 4, 4) if poses inside all limits lie next to all of it; else none.
+
+    Next to: without a jump of the rotation and, with `aspect`, with one sign of det J.
+    """
+    fitted = _core.fit_poses(mech._core, np.ascontiguousarray(way).reshape(-1))
+    if not np.isfinite(fitted).all() or (_turns(fitted) > _turns(way) + _JUMP).any():
+        return None
+    if aspect:
+        signs = np.sign(mech.determinant(fitted).determinant)
+        if not (signs == signs[0]).all():
             return None
-        if self._det is not None:
-            det = self.mech.determinant(fitted).determinant
-            if not (np.sign(det) == np.sign(self._det)).all():
-                return None
-        return np.asarray(fitted[-1])
+    return np.asarray(fitted[-1])
 
 
-def _straight(start: Array, end: Array) -> Array:
+def straight(start: Array, end: Array) -> Array:
     """(w, 4, 4): poses between two, o on a straight line and the rotation about one axis."""
     t = np.linspace(0.0, 1.0, _PIECES)
     way = np.tile(np.eye(4), (_PIECES, 1, 1))

@@ -45,6 +45,9 @@ _MUCH = 0.6
 _MORE = 0.2
 """Part of what was found that is added on each side for the finer grid."""
 
+_FINER = 8
+"""By how much a default grid is finer at most, where from the start no node of a coarser one is reached."""
+
 _HALVINGS = 12
 """Times that a step that is too coarse is halved to find one that is not."""
 
@@ -133,10 +136,16 @@ def _whole(
     where the workspace fills little of it.
     """
     most = grid_of(outer, step, CELLS, cubic=True).bounds()
+    if not np.ptp(region, axis=1).all():
+        region = most
+    finer = 1
     for trial in range(_TRIALS):
-        width = float(np.ptp(region, axis=1).max()) / CELLS if step is None else step
+        width = float(np.ptp(region, axis=1).max()) / (CELLS * finer) if step is None else step
         whole = grid_of(outer, width, CELLS, cubic=True)
         grid = check_size(whole.within(region))
+        if step is None and _begin(mech, grid, pose, keep_aspect, threads) is None and finer < _FINER:
+            finer *= 2
+            continue
         flood = _flood(mech, grid, pose, keep_aspect, threads, progress)
         mask = flood.mask().reshape(grid.counts)
         cut_off, found = _cut_off(mask, grid, whole.bounds()), _found(mask, grid)

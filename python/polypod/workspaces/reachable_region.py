@@ -47,8 +47,10 @@ def wider(region: Array, share: float, outer: Array) -> Array:
 
 def moves_freely(mech: Mechanism, pose: Array) -> bool:
     """Whether o can move in every direction from a pose (4, 4)."""
-    bounds = _core.pose_bounds(mech._core, np.ascontiguousarray(pose).reshape(-1))
-    rows = bounds["constraints"][1] * np.repeat([mech.characteristic_length, 1.0], 3)
+    coordinates = np.zeros(np.count_nonzero(mech.moves_feet))
+    bounds = _core.pose_bounds(mech._core, np.ascontiguousarray(pose).reshape(-1), coordinates)
+    count = 6 - mech.dof  # those of the drives follow
+    rows = bounds["constraints"][1][:count, :6] * np.repeat([mech.characteristic_length, 1.0], 3)
     _, sizes, axes = np.linalg.svd(np.concatenate([rows, np.zeros((6, 6))]))
     free = axes[np.count_nonzero(sizes > _FLAT * max(float(sizes[0]), 1.0)) :]
     velocities = np.linalg.svd(free[:, :3], compute_uv=False)

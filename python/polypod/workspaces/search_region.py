@@ -292,7 +292,7 @@ def find_start(mech: Mechanism, bounds: Array, *, regular: bool) -> Array:
 def _roomiest(mech: Mechanism, bounds: Array) -> Array:
     """(n, 4, 4): the pose with the most room that optimisation finds from home, if there is one."""
     search = PoseSearch(mech, mech.home[None], 0, 0, +1, box=bounds, aspect=False)
-    x = roomiest(search, np.zeros(6))
+    x = roomiest(search, np.zeros(len(search.box)))
     if x is None:
         return np.zeros((0, 4, 4))
     found = _core.fit_poses(mech._core, np.ascontiguousarray(search.pose(x)).reshape(-1))

@@ -160,6 +160,7 @@ class SliceSearch:
         self.box = (box - start[:, None]) / size[:, None]
         limits = [limit.name for limit in cut.mech.limit_list]
         self.names = (*limits, *[SINGULARITY] * cut.keep_aspect)
+        self.least = np.array([INSIDE] * len(limits) + [0.0] * cut.keep_aspect)
         det = cut.mech.determinant(cut.states(start[None])[0]).determinant if cut.keep_aspect else np.ones(1)
         self._det = float(det[0])
 

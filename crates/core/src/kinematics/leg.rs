@@ -46,6 +46,12 @@ pub fn transmission<T: Real>(leg: &Leg<impl Constant<T>>, p: &Position<T>) -> T 
     leg.drive.transmission(p)
 }
 
+/// The equation of a leg's coordinate at a pose, and its branch, without a root.
+#[inline(always)]
+pub fn closure<T: Real>(leg: &Leg<impl Constant<T>>, pose: &Pose<T>, coordinate: T) -> (T, T) {
+    leg.drive.closure(vectors(leg, pose).1, coordinate)
+}
+
 /// The wrench of a unit force of the actuator, a row of the Jacobian [Eq. 6] \[T68\].
 #[inline(always)]
 pub fn row<T: Real>(leg: &Leg<impl Constant<T>>, p: &Position<T>) -> Wrench<T> {

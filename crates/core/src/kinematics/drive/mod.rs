@@ -54,6 +54,16 @@ impl<S> Drive<S> {
         ask!(self, transmission(p))
     }
 
+    /// What r from B to b and the coordinate must keep, as smooth functions of both: the first is zero where the
+    /// strut has its length; the second, above zero on the leg's branch, is the size of δ·d there.
+    #[inline(always)]
+    pub fn closure<T: Real>(&self, r: Vec3<T>, coordinate: T) -> (T, T)
+    where
+        S: Constant<T>,
+    {
+        ask!(self, closure(r, coordinate))
+    }
+
     /// The wrench of a unit force of the actuator, a row of the Jacobian [Eq. 6] \[T68\].
     #[inline(always)]
     pub fn row<T: Real>(&self, p: &Position<T>) -> Wrench<T>

@@ -49,6 +49,17 @@ impl<S> Slider<S> {
         p.delta.dot(self.a())
     }
 
+    /// (|r - q a|² - c²)/c² and (r - q a)·a on the side of the branch, in units of c.
+    #[inline(always)]
+    pub(super) fn closure<T: Real>(&self, r: Vec3<T>, coordinate: T) -> (T, T)
+    where
+        S: Constant<T>,
+    {
+        let (a, c) = (self.a::<T>(), self.strut.lift());
+        let strut = (r - a * coordinate) * (T::one() / c);
+        (strut.dot(strut) - T::one(), strut.dot(a).scale(self.branch))
+    }
+
     /// \[T68\]
     #[inline(always)]
     pub(super) fn row<T: Real>(&self, p: &Position<T>) -> Wrench<T>

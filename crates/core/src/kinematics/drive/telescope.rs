@@ -27,6 +27,12 @@ impl Telescope {
         T::one()
     }
 
+    #[inline(always)]
+    pub(super) fn closure<T: Real>(&self, r: Vec3<T>, coordinate: T) -> (T, T) {
+        let strut = r * (T::one() / coordinate);
+        (strut.dot(strut) - T::one(), T::one())
+    }
+
     /// [Eq. 6]
     #[inline(always)]
     pub(super) fn row<T: Real>(&self, p: &Position<T>) -> Wrench<T> {
