@@ -279,9 +279,10 @@ class Mechanism:
                 f"{mobility.uncontrolled} of its degrees of freedom at every pose, so that forces and "
                 "velocities are not determined anywhere."
             )
-        elif self._loses_constraints:
+        elif gained := self._gained_at_home:
             notes.append(
-                f"singular at its centre pose, or nearly so; {SingularityKind.CONSTRAINT.message}. "
+                "singular at its centre pose, or nearly so; "
+                f"{SingularityKind.CONSTRAINT.with_freedoms(gained)}. "
                 "Forces there are not determined or large; stay clear of it."
             )
         elif not sigma.sigma_min > NEAR_SINGULAR:
@@ -327,10 +328,11 @@ class Mechanism:
         return notes
 
     @property
-    def _loses_constraints(self) -> bool:
-        """Whether the centre pose is a constraint singularity, or near one."""
-        kind = int(self.singularity(self.home, tolerance=NEAR_SINGULAR).kind)
-        return kind in (SingularityKind.CONSTRAINT, SingularityKind.CONSTRAINT_VANISHES)
+    def _gained_at_home(self) -> int:
+        """Degrees of freedom that the centre pose gains if it is a constraint singularity, or near one; else 0."""
+        home = self.singularity(self.home, tolerance=NEAR_SINGULAR)
+        constraint = int(home.kind) in (SingularityKind.CONSTRAINT, SingularityKind.CONSTRAINT_VANISHES)
+        return int(home.uncontrolled) if constraint else 0
 
     def mobility(self) -> Mobility:
         """Degrees of freedom, joints and redundant constraints, from generic ranks [Eq. 1, T18]."""

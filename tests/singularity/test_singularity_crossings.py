@@ -74,8 +74,8 @@ def test_a_rest_at_a_singular_pose_is_one_finding():
     time = np.linspace(0, 1, 21)
     q = {name: np.full(21, value) for name, value in QUARTER.items()}
     findings = pp.solve(GOUGH, Motion.through(time, q, set="pose")).singularities
-    assert len(findings["crossings"]) == 1
-    assert [(p["start"], p["end"]) for p in findings["near"]] == [(0.0, 1.0)]
+    assert findings["crossings"] == []
+    assert [(p["start"], p["end"], p["stays"]) for p in findings["near"]] == [(0.0, 1.0, True)]
 
 
 def test_near_passages_have_their_own_kind_and_leg():

@@ -18,7 +18,7 @@ class SingularityKind(IntEnum):
     CONSTRAINT_VANISHES = 2
     """The wrench of a constraint vanishes, as where L ∥ l and r ∥ L: the paper's first."""
     CONSTRAINT = 3
-    """The constraint wrenches depend on one another: a degree of freedom more, that no actuator controls."""
+    """The constraint wrenches depend on one another: degrees of freedom more, that no actuator controls."""
     LEG_FRAME = 4
     """A leg lies along the axis of its universal joint or rod: its rotation about itself is undetermined."""
     ACTUATION = 5
@@ -32,6 +32,11 @@ class SingularityKind(IntEnum):
     def message(self) -> str:
         """Meaning of the kind."""
         return _MESSAGES.get(self, "no answer; the status says why")
+
+    def with_freedoms(self, gained: int) -> str:
+        """Meaning of the kind, with the number of degrees of freedom that the locked actuators leave."""
+        counted = self in (SingularityKind.CONSTRAINT, SingularityKind.CONSTRAINT_VANISHES) and gained > 0
+        return f"{self.message}, {gained} here" if counted else self.message
 
 
 _MESSAGES = {code: message for code, _, message in _core.singularity_kinds()}

@@ -3,12 +3,14 @@
 The findings are plain data that JSON holds; times in s, measures pure numbers, legs by name:
 
     threshold: measure below which a pose is near a singularity
-    crossings: list of {time, kind, leg, crosses, found, between}; det J changes its sign there (`crosses`)
-        or is zero and turns back. `found` is false where det J has another sign after a gap or jump of the
-        states and no singular pose is known in between; `kind` is then UNKNOWN. `between`: the known instants
-        around it.
-    near: list of {kind, leg, start, end, time, minimum}; intervals of known instants at which the measure of
-        that kind is below the threshold, its least value and when
+    crossings: list of {time, kind, leg, freedoms, crosses, found, between}; det J changes its sign there
+        (`crosses`) or is zero and turns back. `found` is false where det J has another sign after a gap or jump
+        of the states and no singular pose is known in between; `kind` is then UNKNOWN. `between`: the known
+        instants around it. Where the motion stays at singular poses there are none: `near` tells.
+    near: list of {kind, leg, start, end, time, minimum, stays, freedoms}; intervals of known instants at which
+        the measure of that kind is below the threshold, its least value and when; whether it is zero, up to
+        rounding, all the while
+    freedoms: that the locked actuators leave at the pose that is found or nearest, where it is singular; else 0
     uncontrolled: degrees of freedom that the locked actuators leave at every pose, by design; crossings are
         then not sought
 """
@@ -43,6 +45,14 @@ RESOLUTION = 1e-6
 """Share of the motion's duration below which two zeros are one that is touched: rounding makes two of one."""
 
 
+SINGULAR = 1e-6
+"""Measure below which a pose is singular: constraints that depend on one another are met, by poses that follow
+from coordinates, up to the root of rounding."""
+
+STAYS = 3
+"""Samples in a row at singular poses with which a motion stays at such."""
+
+
 @dataclass(frozen=True)
 class _Known:
     """Instants, poses and det J with its rate, along a motion."""
@@ -69,14 +79,15 @@ def find_passages(
     """Singular poses that a motion, solved at its samples, meets: the findings described above."""
     known = _Known(*map(np.ascontiguousarray, (motion.time, pose, determinant.determinant, determinant.rate)))
     uncontrolled, crossings = mech.mobility().uncontrolled, []
+    stays = _stays(mech, known)
     if not uncontrolled:
         known = _settled(mech, motion, known)
-        crossings = [*_crossings(mech, known)]
+        crossings = [*_crossings(mech, known, stays)]
     return {
         "threshold": threshold,
         "uncontrolled": uncontrolled,
         "crossings": crossings,
-        "near": [*_near(mech, known, threshold)],
+        "near": [*_near(mech, known, threshold, stays)],
     }
 
 
@@ -85,12 +96,12 @@ def sampled_passages(
 ) -> dict[str, Any]:
     """Singular poses between states known at their instants only: zeros between them are those of cubics."""
     known = _Known(*map(np.ascontiguousarray, (time, pose, determinant.determinant, determinant.rate)))
-    uncontrolled = mech.mobility().uncontrolled
+    uncontrolled, stays = mech.mobility().uncontrolled, _stays(mech, known)
     return {
         "threshold": threshold,
         "uncontrolled": uncontrolled,
-        "crossings": [] if uncontrolled else [*_crossings(mech, known)],
-        "near": [*_near(mech, known, threshold)],
+        "crossings": [] if uncontrolled else [*_crossings(mech, known, stays)],
+        "near": [*_near(mech, known, threshold, stays)],
     }
 
 
@@ -125,7 +136,17 @@ def _evaluated(mech: Mechanism, motion: Motion, known: _Known, times: Array) -> 
     return _Known(times, state.pose, det.determinant, det.rate)
 
 
-def _crossings(mech: Mechanism, known: _Known) -> Iterator[dict[str, Any]]:
+Stays = list[tuple[float, float]]
+
+
+def _stays(mech: Mechanism, samples: _Known) -> Stays:
+    """Intervals of the samples at which the motion stays at singular poses."""
+    singular = mech.singularity(samples.pose, tolerance=SINGULAR).kind > SingularityKind.NONE
+    runs = [(start, end) for start, end in _runs(singular) if end - start >= STAYS]
+    return [(float(samples.time[start]), float(samples.time[end - 1])) for start, end in runs]
+
+
+def _crossings(mech: Mechanism, known: _Known, stays: Stays) -> Iterator[dict[str, Any]]:
     solved = np.isfinite(known.determinant)
     time, poses = known.time[solved], known.pose[solved]
     if len(time) < 2:
@@ -134,19 +155,23 @@ def _crossings(mech: Mechanism, known: _Known) -> Iterator[dict[str, Any]]:
     touched = -2
     for zero, crosses in _core.zeros(known.time, known.determinant, known.rate, resolution):
         nearest = int(np.argmin(np.abs(time - zero)))
+        if any(start - resolution <= zero <= end + resolution for start, end in stays):
+            continue
         settled = bool(abs(time[nearest] - zero) <= resolution)
-        singular = mech.singularity(poses[nearest])
-        found = settled and singular.kind not in (SingularityKind.NONE, SingularityKind.UNKNOWN)
+        at = mech.singularity(poses[nearest], tolerance=SINGULAR)
+        kind, leg = int(at.kind), int(at.leg)
+        found = settled and kind > SingularityKind.NONE
         if not crosses:
-            # A near miss is none; of a motion that stays at singular poses the first is enough.
+            # A near miss is none; of two next to each other the first is enough.
             again, touched = nearest == touched + 1, nearest if found else touched
             if again or not found:
                 continue
         index = int(np.clip(np.searchsorted(time, zero, side="right"), 1, len(time) - 1))
         yield {
             "time": float(zero),
-            "kind": SingularityKind(int(singular.kind) if found else SingularityKind.UNKNOWN).name,
-            "leg": mech.leg_names[int(singular.leg)] if found and singular.leg >= 0 else None,
+            "kind": SingularityKind(kind if found else SingularityKind.UNKNOWN).name,
+            "leg": mech.leg_names[leg] if found and leg >= 0 else None,
+            "freedoms": int(at.uncontrolled) if found else 0,
             "crosses": crosses,
             "found": found,
             "between": [float(time[index - 1]), float(time[index])],
@@ -156,11 +181,13 @@ def _crossings(mech: Mechanism, known: _Known) -> Iterator[dict[str, Any]]:
 # --- near passages ------------------------------------------------------------------------------------------
 
 
-def _near(mech: Mechanism, known: _Known, threshold: float) -> Iterator[dict[str, Any]]:
+def _near(mech: Mechanism, known: _Known, threshold: float, stays: Stays) -> Iterator[dict[str, Any]]:
     """Intervals in which a measure of nearness is below the threshold, in the order of time."""
-    poses = mech.singularity(known.pose)
+    poses = mech.singularity(known.pose, tolerance=SINGULAR)
+    of_constraints = np.isin(poses.kind, (SingularityKind.CONSTRAINT, SingularityKind.CONSTRAINT_VANISHES))
     measures: list[tuple[SingularityKind, str | None, Array]] = [
-        (SingularityKind.ACTUATION, None, poses.sigma_min),
+        # Where constraints are lost, so is what the actuators hold: that is one singularity.
+        (SingularityKind.ACTUATION, None, np.where(of_constraints, np.inf, poses.sigma_min)),
         (SingularityKind.CONSTRAINT, None, poses.constraint_sigma),
     ]
     for i, leg in enumerate(mech.leg_names):
@@ -168,30 +195,36 @@ def _near(mech: Mechanism, known: _Known, threshold: float) -> Iterator[dict[str
         measures.append((SingularityKind.LEG_FRAME, leg, poses.leg_sine[:, i]))
         measures.append((SingularityKind.STRUT_ACROSS_RAIL, leg, np.abs(poses.transmission[:, i])))
     found = []
-    for measured, of_leg, measure in measures:
-        for start, end in _runs(measure < threshold):
-            least = start + int(np.argmin(measure[start:end]))
-            of_constraint = measured == SingularityKind.CONSTRAINT
-            what = _of_constraint(mech, known.pose[least], threshold) if of_constraint else (measured, of_leg)
+    for kind, of_leg, measure in measures:
+        runs = [
+            (start, end, start + int(np.argmin(measure[start:end])))
+            for start, end in _runs(measure < threshold)
+        ]
+        vanishing = _vanishing(mech, known.pose[[least for *_, least in runs]], threshold)
+        for (start, end, least), vanishes in zip(runs, vanishing, strict=True):
+            of_constraint = kind == SingularityKind.CONSTRAINT and vanishes is not None
+            singular = measure[start:end] <= SINGULAR
+            first, last = float(known.time[start]), float(known.time[end - 1])
             found.append(
                 {
-                    "kind": what[0].name,
-                    "leg": what[1],
-                    "start": float(known.time[start]),
-                    "end": float(known.time[end - 1]),
+                    "kind": (SingularityKind.CONSTRAINT_VANISHES if of_constraint else kind).name,
+                    "leg": vanishes if of_constraint else of_leg,
+                    "start": first,
+                    "end": last,
                     "time": float(known.time[least]),
                     "minimum": float(measure[least]),
+                    "stays": bool(singular.all()) and any(first <= a and b <= last for a, b in stays),
+                    "freedoms": int(poses.uncontrolled[least]) if singular.any() else 0,
                 }
             )
     yield from sorted(found, key=lambda passage: (passage["start"], passage["kind"], passage["leg"] or ""))
 
 
-def _of_constraint(mech: Mechanism, pose: Array, threshold: float) -> tuple[SingularityKind, str | None]:
-    """Whether a constraint nearly vanishes, and of which leg."""
-    near = mech.singularity(pose, tolerance=threshold)
-    vanishes = near.kind == SingularityKind.CONSTRAINT_VANISHES
-    leg = mech.leg_names[int(near.leg)] if vanishes else None
-    return (SingularityKind.CONSTRAINT_VANISHES if vanishes else SingularityKind.CONSTRAINT), leg
+def _vanishing(mech: Mechanism, poses: Array, threshold: float) -> list[str | None]:
+    """The leg whose constraint nearly vanishes at each pose (n, 4, 4), if one does."""
+    near = mech.singularity(poses, tolerance=threshold)
+    vanish = near.kind == SingularityKind.CONSTRAINT_VANISHES
+    return [mech.leg_names[leg] if of else None for leg, of in zip(near.leg, vanish, strict=True)]
 
 
 def _runs(below: NDArray[np.bool_]) -> list[tuple[int, int]]:
@@ -221,6 +254,10 @@ def warnings_of(findings: dict[str, Any]) -> list[str]:
             f"the motion {verb} a singular pose at {instant(crossing['time'], 9)}{_meaning(crossing)}"
         )
     for passage in findings["near"]:
+        if passage["stays"]:
+            start, end = instant(passage["start"]), instant(passage["end"])
+            notes.append(f"the motion stays at singular poses from {start} to {end}{_meaning(passage)}")
+            continue
         when = (
             f"from {instant(passage['start'])} to {instant(passage['end'])}"
             if passage["end"] > passage["start"]
@@ -235,4 +272,4 @@ def warnings_of(findings: dict[str, Any]) -> list[str]:
 
 def _meaning(finding: dict[str, Any]) -> str:
     leg = f" (leg {finding['leg']})" if finding["leg"] is not None else ""
-    return f"{leg}; {SingularityKind[finding['kind']].message}."
+    return f"{leg}; {SingularityKind[finding['kind']].with_freedoms(finding['freedoms'])}."

@@ -6,7 +6,7 @@ use super::checks::{
     check_legs, finite, forwards, is_rotation, pose_at, raw_pose, then, with_legs, with_motion,
 };
 use crate::kinematics::coordinate_sets::{self, MAX_COORDINATES, Set, Values};
-use crate::kinematics::dependent_coordinates::{self, Conditions, CoordinateState, Dependent};
+use crate::kinematics::dependent_coordinates::{self, Conditions, CoordinateState, Dependent, FOLD_PIVOTS};
 use crate::model::mechanism::Mechanism;
 use crate::model::status::Status;
 use crate::number::lanes::Lanes;
@@ -69,7 +69,8 @@ pub fn states(mech: &Mechanism, input: &Coordinates, n: usize) -> Table {
                 None if !input.continued => mech.home,
                 _ => last,
             };
-            let state = dependent_coordinates::state(mech, &input.set, &q, &mask, input.branch, &guess);
+            let state =
+                dependent_coordinates::state(mech, &input.set, &q, &mask, input.branch, &guess, FOLD_PIVOTS);
             let state = checked(mech, state, all_given);
             let jumped = input.continued && state.status == Status::Ok && state.branch * branch < 0.0;
             let status = if jumped { Status::BranchJump } else { state.status };
@@ -197,7 +198,7 @@ work! {
         start: &'a Values<f64>,
         wanted: Mask<V>,
     } -> Conditions<V> {
-        dependent_coordinates::solve_dependent(mech, set, q, dependent, start, wanted).0
+        dependent_coordinates::solve_dependent(mech, set, q, dependent, start, wanted, FOLD_PIVOTS).0
     }
 }
 work! {

@@ -8,7 +8,7 @@
 use crate::dynamics::inverse_dynamics::{damping_wrench, leg_wrench, own_wrench, resultant};
 use crate::kinematics::constraint;
 use crate::kinematics::coordinate_sets::{MAX_COORDINATES, Set, Values};
-use crate::kinematics::dependent_coordinates;
+use crate::kinematics::dependent_coordinates::{self, DEPENDENT_PIVOTS};
 use crate::kinematics::leg;
 use crate::kinematics::quadratic_forms::quadratic;
 use crate::kinematics::rows::Matrix6;
@@ -234,7 +234,7 @@ pub fn coordinate_equations(
         for (&k, &rate) in free.iter().zip(rates) {
             jets[k].d = rate;
         }
-        dependent_coordinates::state(mech, set, &jets, &mask, branch, pose)
+        dependent_coordinates::state(mech, set, &jets, &mask, branch, pose, DEPENDENT_PIVOTS)
     };
     let still = state(&[0.0; 6]);
     if still.status != Status::Ok {

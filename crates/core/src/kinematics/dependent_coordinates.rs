@@ -16,11 +16,19 @@ const FOLD: f64 = 1e-6;
 /// |cos γ| - 1 that is rounding of one.
 const COSINE_ROUNDING: f64 = 1e-12;
 
-/// Pivot ratio below which the dependent coordinates are not determined.
+/// Pivot ratio below which the dependent coordinates are not determined to working precision.
 pub const DEPENDENT_PIVOTS: f64 = 1e-9;
+
+/// Pivot ratio below which a state counts as one where they are not determined: well above what rounding makes of
+/// zero. Where constraints depend on one another residuals go with the square of what a pose is off, so that
+/// Newton's method ends about the root of rounding, 1e-8, away from it.
+pub const FOLD_PIVOTS: f64 = 1e-6;
 
 /// Residual, as a pure number, that is rounding of zero.
 const SOLVED: f64 = 1e-12;
+
+/// Residual, as a pure number, that no step makes less: where solutions meet, steps go on without end.
+const ROUNDED: f64 = 1e-15;
 
 const NEWTON_STEPS: usize = 50;
 
@@ -37,8 +45,10 @@ pub struct CoordinateState {
 /// Pose, twist and acceleration from the given coordinates and their rates; dependent ones are solved from
 /// the constraints, starting at those of `guess`.
 ///
-/// `given` marks the entries of `q` that are given. `branch` is the sign of sin γ for [Eq. 5].
+/// `given` marks the entries of `q` that are given. `branch` is the sign of sin γ for [Eq. 5]. `least` is the pivot
+/// ratio up to which a state is a fold.
 #[must_use]
+#[allow(clippy::too_many_arguments)]
 pub fn state(
     mech: &Mechanism,
     set: &Set,
@@ -46,6 +56,7 @@ pub fn state(
     given: &[bool],
     branch: f64,
     guess: &Pose<f64>,
+    least: f64,
 ) -> CoordinateState {
     let mut q = *q;
     let finite =
@@ -57,7 +68,7 @@ pub fn state(
         (_, Status::Ok) if dependent.count == 0 => (Status::Ok, 1.0),
         (_, Status::Ok) => {
             let start = set.values(mech, guess);
-            let (conditions, sign) = solve_dependent(mech, set, &mut q, &dependent, &start, true);
+            let (conditions, sign) = solve_dependent(mech, set, &mut q, &dependent, &start, true, least);
             let status = first(conditions);
             (status, if status == Status::Ok { sign } else { f64::NAN })
         }
@@ -148,7 +159,7 @@ impl Dependent {
 
 /// Newton on the independent constraints for the coordinates that are not given, from those of `start`, then
 /// their rates and second rates from the same matrix: `G_y y' = -ġ(y' = 0)`, `G_y y'' = -g̈(y'' = 0)`
-/// \[T23\]. Only where they are `wanted`; every lane goes its own way to its own end. Returns the sign of det
+/// \[T23\]. Only where they are `wanted`, and regular above `least`; every lane goes its own way to its own end. Returns the sign of det
 /// G_y too: it tells apart the solutions that meet in a fold.
 #[inline(always)]
 pub fn solve_dependent<V: Lanes>(
@@ -158,6 +169,7 @@ pub fn solve_dependent<V: Lanes>(
     dependent: &Dependent,
     start: &Values<f64>,
     wanted: Mask<V>,
+    least: f64,
 ) -> (Conditions<V>, V) {
     let (zero, one, nan) = (V::zero(), V::one(), V::lit(f64::NAN));
     let (numbers, scale, unsolved) = (dependent.numbers(), mech.characteristic_length, *q);
@@ -202,7 +214,8 @@ pub fn solve_dependent<V: Lanes>(
             share = share.scale(0.5);
         }
         let exact = V::select(size(&g).at_most(zero), one, zero);
-        let near = V::select(largest.at_most(V::lit(1e-10)), one, exact);
+        let rounded = V::select(size(&g).at_most(V::lit(ROUNDED)), one, exact);
+        let near = V::select(largest.at_most(V::lit(1e-10)), one, rounded);
         let there = V::select(largest.at_most(V::lit(1e-13)), one, exact);
         let under_way = active.greater(zero);
         converged = V::select(under_way, near, converged);
@@ -212,7 +225,7 @@ pub fn solve_dependent<V: Lanes>(
         }
     }
     let (pivots, sign) = follow(mech, set, q, dependent);
-    let (arrived, regular) = (converged.greater(zero), pivots.greater(V::lit(DEPENDENT_PIVOTS)));
+    let (arrived, regular) = (converged.greater(zero), pivots.greater(V::lit(least)));
     for &i in numbers {
         let Jet { x, d, dd } = q[i];
         let rates = [V::select(regular, d, nan), V::select(regular, dd, nan)];

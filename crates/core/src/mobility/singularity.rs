@@ -58,11 +58,11 @@ impl Kind {
             }
             Kind::ConstraintVanishes => {
                 "constraint singularity: the wrench of a constraint vanishes (c = τ = 0, as where L ∥ l and \
-                 r ∥ L), and the platform gains a degree of freedom that no actuator controls"
+                 r ∥ L), and the platform gains degrees of freedom that no actuator controls"
             }
             Kind::Constraint => {
                 "constraint singularity: the legs' constraint wrenches depend on one another, and the \
-                 platform gains a degree of freedom that no actuator controls"
+                 platform gains degrees of freedom that no actuator controls"
             }
             Kind::LegFrame => {
                 "passive singularity: a leg lies along the axis of its universal joint or rod, so its \

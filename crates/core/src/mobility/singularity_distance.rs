@@ -5,7 +5,7 @@ use std::cell::Cell;
 use std::f64::consts::PI;
 
 use crate::kinematics::coordinate_sets::{MAX_COORDINATES, Set, Values};
-use crate::kinematics::dependent_coordinates::{self, CoordinateState};
+use crate::kinematics::dependent_coordinates::{self, CoordinateState, DEPENDENT_PIVOTS};
 use crate::mobility::singularity::{self, Kind, TOLERANCE};
 use crate::model::mechanism::Mechanism;
 use crate::model::status::Status;
@@ -77,8 +77,15 @@ pub fn start(
     let q = search.set.values(mech, pose);
     let mut status = Status::NotConverged;
     for branch in [1.0, -1.0] {
-        let state =
-            dependent_coordinates::state(mech, &search.set, &q.map(Jet::lit), &mask(search), branch, pose);
+        let state = dependent_coordinates::state(
+            mech,
+            &search.set,
+            &q.map(Jet::lit),
+            &mask(search),
+            branch,
+            pose,
+            DEPENDENT_PIVOTS,
+        );
         if state.status != Status::Ok {
             status = state.status;
         } else if same(&state.platform.pose, pose, search.scale) {
@@ -127,6 +134,7 @@ impl CoordinatePath<'_> {
             &self.given,
             self.branch,
             &self.last.get(),
+            DEPENDENT_PIVOTS,
         )
     }
 
