@@ -329,7 +329,7 @@ class Mechanism:
 
     @property
     def _gained_at_home(self) -> int:
-        """Degrees of freedom that the centre pose gains if it is a constraint singularity, or near one; else 0."""
+        """Degrees of freedom that the centre pose gains: not 0 at a constraint singularity, or near one."""
         home = self.singularity(self.home, tolerance=NEAR_SINGULAR)
         constraint = int(home.kind) in (SingularityKind.CONSTRAINT, SingularityKind.CONSTRAINT_VANISHES)
         return int(home.uncontrolled) if constraint else 0

@@ -4,12 +4,12 @@ The findings are plain data that JSON holds; times in s, measures pure numbers, 
 
     threshold: measure below which a pose is near a singularity
     crossings: list of {time, kind, leg, freedoms, crosses, found, between}; det J changes its sign there
-        (`crosses`) or is zero and turns back. `found` is false where det J has another sign after a gap or jump
-        of the states and no singular pose is known in between; `kind` is then UNKNOWN. `between`: the known
-        instants around it. Where the motion stays at singular poses there are none: `near` tells.
-    near: list of {kind, leg, start, end, time, minimum, stays, freedoms}; intervals of known instants at which
-        the measure of that kind is below the threshold, its least value and when; whether it is zero, up to
-        rounding, all the while
+        (`crosses`) or is zero and turns back. `found` is false where det J has another sign after a gap or
+        jump of the states and no singular pose is known in between; `kind` is then UNKNOWN. `between`: the
+        known instants around it. Where the motion stays at singular poses there are none: `near` tells.
+    near: list of {kind, leg, start, end, time, minimum, stays, freedoms}; intervals of known instants at
+        which the measure of that kind is below the threshold, its least value and when; whether it is zero
+        all the while, up to rounding
     freedoms: that the locked actuators leave at the pose that is found or nearest, where it is singular; else 0
     uncontrolled: degrees of freedom that the locked actuators leave at every pose, by design; crossings are
         then not sought
@@ -46,8 +46,21 @@ RESOLUTION = 1e-6
 
 
 SINGULAR = 1e-6
-"""Measure below which a pose is singular: constraints that depend on one another are met, by poses that follow
-from coordinates, up to the root of rounding."""
+"""Measure below which a pose is singular: where constraints depend on one another, poses that follow from
+coordinates are off by the root of rounding."""
+
+CHUNK = 20_000
+"""Poses analysed at once: memory does not grow with what is not kept."""
+
+_MEASURES = (
+    "kind",
+    "uncontrolled",
+    "sigma_min",
+    "constraint_sigma",
+    "leg_length",
+    "leg_sine",
+    "transmission",
+)
 
 STAYS = 3
 """Samples in a row at singular poses with which a motion stays at such."""
@@ -141,7 +154,7 @@ Stays = list[tuple[float, float]]
 
 def _stays(mech: Mechanism, samples: _Known) -> Stays:
     """Intervals of the samples at which the motion stays at singular poses."""
-    singular = mech.singularity(samples.pose, tolerance=SINGULAR).kind > SingularityKind.NONE
+    singular = _measured(mech, samples.pose)["kind"] > SingularityKind.NONE
     runs = [(start, end) for start, end in _runs(singular) if end - start >= STAYS]
     return [(float(samples.time[start]), float(samples.time[end - 1])) for start, end in runs]
 
@@ -183,17 +196,17 @@ def _crossings(mech: Mechanism, known: _Known, stays: Stays) -> Iterator[dict[st
 
 def _near(mech: Mechanism, known: _Known, threshold: float, stays: Stays) -> Iterator[dict[str, Any]]:
     """Intervals in which a measure of nearness is below the threshold, in the order of time."""
-    poses = mech.singularity(known.pose, tolerance=SINGULAR)
-    of_constraints = np.isin(poses.kind, (SingularityKind.CONSTRAINT, SingularityKind.CONSTRAINT_VANISHES))
+    at = _measured(mech, known.pose)
+    of_constraints = np.isin(at["kind"], (SingularityKind.CONSTRAINT, SingularityKind.CONSTRAINT_VANISHES))
     measures: list[tuple[SingularityKind, str | None, Array]] = [
         # Where constraints are lost, so is what the actuators hold: that is one singularity.
-        (SingularityKind.ACTUATION, None, np.where(of_constraints, np.inf, poses.sigma_min)),
-        (SingularityKind.CONSTRAINT, None, poses.constraint_sigma),
+        (SingularityKind.ACTUATION, None, np.where(of_constraints, np.inf, at["sigma_min"])),
+        (SingularityKind.CONSTRAINT, None, at["constraint_sigma"]),
     ]
     for i, leg in enumerate(mech.leg_names):
-        measures.append((SingularityKind.LEG_LENGTH, leg, poses.leg_length[:, i]))
-        measures.append((SingularityKind.LEG_FRAME, leg, poses.leg_sine[:, i]))
-        measures.append((SingularityKind.STRUT_ACROSS_RAIL, leg, np.abs(poses.transmission[:, i])))
+        measures.append((SingularityKind.LEG_LENGTH, leg, at["leg_length"][:, i]))
+        measures.append((SingularityKind.LEG_FRAME, leg, at["leg_sine"][:, i]))
+        measures.append((SingularityKind.STRUT_ACROSS_RAIL, leg, np.abs(at["transmission"][:, i])))
     found = []
     for kind, of_leg, measure in measures:
         runs = [
@@ -214,10 +227,22 @@ def _near(mech: Mechanism, known: _Known, threshold: float, stays: Stays) -> Ite
                     "time": float(known.time[least]),
                     "minimum": float(measure[least]),
                     "stays": bool(singular.all()) and any(first <= a and b <= last for a, b in stays),
-                    "freedoms": int(poses.uncontrolled[least]) if singular.any() else 0,
+                    "freedoms": int(at["uncontrolled"][least]) if singular.any() else 0,
                 }
             )
     yield from sorted(found, key=lambda passage: (passage["start"], passage["kind"], passage["leg"] or ""))
+
+
+def _measured(mech: Mechanism, poses: Array) -> dict[str, NDArray[Any]]:
+    """What of singularity analysis is looked at here, of poses (n, 4, 4): the rest of it is not kept."""
+    parts = []
+    for first in range(0, max(len(poses), 1), CHUNK):
+        part = mech.singularity(poses[first : first + CHUNK], tolerance=SINGULAR)
+        parts.append([getattr(part, name) for name in _MEASURES])
+    return {
+        name: np.concatenate(columns)
+        for name, columns in zip(_MEASURES, zip(*parts, strict=True), strict=True)
+    }
 
 
 def _vanishing(mech: Mechanism, poses: Array, threshold: float) -> list[str | None]:

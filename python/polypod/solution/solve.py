@@ -57,15 +57,20 @@ def solve(
     {'time': 801, 'leg': 5}
     """
     state = states_along(mech, motion)
-    total, parts = len(motion.time), []
+    total = len(motion.time)
+    values: dict[str, NDArray[Any]] = {}
     for start in range(0, total, CHUNK):
         chunk = slice(start, min(start + CHUNK, total))
         part = _solve_chunk(mech, motion, state, chunk)
-        parts.append(part | _solve_reactions(mech, motion, state, chunk) if reactions else part)
+        if reactions:
+            part |= _solve_reactions(mech, motion, state, chunk)
+        for name, column in part.items():
+            # The whole at once: long motions need their memory once, and what a part needed serves the next.
+            if name not in values:
+                values[name] = np.empty((total, *column.shape[1:]), column.dtype)
+            values[name][chunk] = column
         if progress is not None:
             progress(chunk.stop, total)
-    # Each part goes when its whole is there: long motions need their memory once, not twice.
-    values = {name: np.concatenate([part.pop(name) for part in parts]) for name in [*parts[0]]}
     values["actuator_work"] = work_of(motion.time, values["actuator_power"])
     determinant = Determinant(
         mech,

@@ -4,7 +4,7 @@
 
 use polypod_core::assembly::build::assemble;
 use polypod_core::kinematics::coordinate_sets::{MAX_COORDINATES, Set};
-use polypod_core::kinematics::dependent_coordinates;
+use polypod_core::kinematics::dependent_coordinates::{self, DEPENDENT_PIVOTS};
 use polypod_core::kinematics::leg;
 use polypod_core::mobility::degrees_of_freedom;
 use polypod_core::model::mechanism::Mechanism;
@@ -292,7 +292,8 @@ pub fn states(mech: &Mechanism, count: usize, seed: u64) -> Vec<Motion<f64>> {
                 let (d, dd) = if k < 6 { motion[k] } else { (0.0, 0.0) };
                 Jet::new(at[k], d, dd)
             });
-            let state = dependent_coordinates::state(mech, &Set::Pose, &q, &given, 1.0, &pose);
+            let state =
+                dependent_coordinates::state(mech, &Set::Pose, &q, &given, 1.0, &pose, DEPENDENT_PIVOTS);
             let speed = state.platform.twist.v.norm() + state.platform.twist.omega.norm();
             if state.status == Status::Ok && speed < 20.0 {
                 result.push(state.platform);
