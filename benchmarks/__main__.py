@@ -149,6 +149,8 @@ def measure():
     results["actuation"] = child("actuation", timeout=1800)
     say("import, list and build")
     results["start"] = start.measured()
+    say("long files")
+    results["long_files"] = child("long_files")
     say("workspaces")
     results["workspaces"] = workspaces(threads[-1])
     say("Rust")

@@ -218,6 +218,20 @@ def start_table(results):
     return table(("", "time", "quartiles"), rows)
 
 
+def long_files_table(results):
+    rows = [
+        (
+            f"`polypod {row['what']}`, {row['rows']} rows",
+            time(1e9 * row["seconds"]),
+            time(1e9 * row["least"]),
+            digits(row["ratio"], 2),
+            f"{row['peak'] / 1e9:.1f} GB",
+        )
+        for row in results["long_files"]
+    ]
+    return table(("", "the command", "the least", "ratio", "peak of the process"), rows)
+
+
 def spread_of(row):
     return f"{time(1e9 * row['low'])} to {time(1e9 * row['high'])}"
 
@@ -233,6 +247,7 @@ TABLES = {
     "workspaces": workspaces_table,
     "actuation": actuation_table,
     "start": start_table,
+    "long files": long_files_table,
 }
 
 
