@@ -78,6 +78,7 @@ class Mechanism:
     ) -> None:
         # What reads and writes files is imported where it is used: an import of Polypod need not wait for it.
         from polypod.files.mechanism_spec import read_spec
+        from polypod.files.units import in_units
 
         self._data: dict[str, Any] = _plain(data)
         self._text = text
@@ -87,7 +88,8 @@ class Mechanism:
         except _core.Faults as error:
             # What the core misses in lists that are none follows from that.
             told = {fault.place for fault in faults} & {"legs", "rods"}
-            found = [Fault(*fault) for fault in error.args[0]]
+            units = self._data.get("units")
+            found = [Fault(place, in_units(message, units)) for place, message in error.args[0]]
             faults += [fault for fault in found if fault.place not in told]
         if faults:
             from polypod.files.toml_lines import with_lines

@@ -13,7 +13,7 @@ import tomli_w
 
 import polypod as pp
 from polypod.errors import MechanismError, UnknownNameError
-from polypod.files.units import from_si, to_si
+from polypod.files.units import from_si, in_units, to_si
 from support.mechanism_files import (
     BUILT_IN,
     DELETED,
@@ -82,7 +82,7 @@ BAD: dict[str, tuple[str, dict[str, Any], str, str]] = {
         PAPER,
         {"legs__3__stroke": {"min": 850.0, "max": 650.0}},
         "legs.3.stroke",
-        "min is 0.85 m, max is 0.65 m",
+        "min is 850 mm, max is 650 mm",
     ),
     "no stroke at all": (PAPER, {"legs__3__stroke__max": 650.0}, "legs.3.stroke", "needs 0 <= min < max"),
     "negative stroke": (PAPER, {"legs__3__stroke__min": -1.0}, "legs.3.stroke", "needs 0 <= min < max"),
@@ -136,7 +136,7 @@ BAD: dict[str, tuple[str, dict[str, Any], str, str]] = {
         GOUGH,
         {"legs__1__platform": {"joint": "U", "point": [300.0, 0.0, 0.0], "axis": [1, 2, 3]}},
         "home",
-        'leg "1" (UPU) by 1.403e-1 m: the leg, its axis in the base and its axis in the platform must lie in',
+        'leg "1" (UPU) by 140.3 mm: the leg, its axis in the base and its axis in the platform must lie in',
     ),
     "RPU leg's axes not square": (
         RPS,
@@ -148,7 +148,7 @@ BAD: dict[str, tuple[str, dict[str, Any], str, str]] = {
         PAPER,
         {"legs__3__base__point": [-200.0, 80.0, 0.0]},
         "legs.3.base.point",
-        'lies 0.003435 m off the line of rod "L"',
+        'lies 3.435 mm off the line of rod "L"',
     ),
     "a rod without legs": (
         PAPER,
@@ -208,18 +208,38 @@ def test_home_off_the_constraints_names_legs_and_a_pose_nearby() -> None:
     faults = faults_of(changed(PAPER, home__rotation_vector=[0.0, 0.0, 3.0]))
     assert [place for place, _ in faults] == ["home", "home"]
     for leg, (_, message) in zip("13", faults, strict=True):
-        assert f'misses the constraint of leg "{leg}" (RPU) by 7.861e-3 m' in message
+        assert f'misses the constraint of leg "{leg}" (RPU) by 7.861 mm' in message
         found = re.search(
-            r"satisfies all constraints has position (.*) m and rotation_vector (.*) rad", message
+            r"satisfies all constraints has position (.*) mm and rotation_vector (.*) deg", message
         )
         assert found, message
         position, turn = (np.array(json.loads(group)) for group in found.groups())
         nearby = changed(
             PAPER,
-            home__position=(position * 1e3).tolist(),
-            home__rotation_vector=np.degrees(turn).tolist(),
+            home__position=position.tolist(),
+            home__rotation_vector=turn.tolist(),
         )
         assert pp.Mechanism.from_dict(nearby).dof == 5
+
+
+@pytest.mark.parametrize(
+    ("units", "text", "told"),
+    [
+        ({"length": "mm"}, "lies 0.003435 m off", "lies 3.435 mm off"),
+        ({"length": "in"}, "is 1.079e-1 m long", "is 4.248 in long"),
+        (
+            {"length": "mm", "angle": "deg"},
+            "at [0.1, -2.5] m, 3.14159 rad",
+            "at [100, -2500] mm, 180.000 deg",
+        ),
+        ({"length": "mm"}, 'leg "5 m" is 5 m', 'leg "5 m" is 5000 mm'),
+        ({"length": "mm", "mass": "g"}, "1 kg, 2 kg m^2, 3 m/s, 4 N m", "1000 g, 2 kg m^2, 3 m/s, 4 N m"),
+        ({"length": "ell"}, "is 5 m", "is 5 m"),
+        (["length"], "is 5 m", "is 5 m"),
+    ],
+)
+def test_messages_of_the_core_are_in_units_of_the_file(units, text, told) -> None:
+    assert in_units(text, units) == told
 
 
 def test_many_different_faults_are_reported_at_once() -> None:
@@ -247,7 +267,7 @@ def test_many_different_faults_are_reported_at_once() -> None:
         "platform.mass": "must be positive",
         "rods.1.inertia": "belongs to no body",
         "legs.2.piston.inertia": "is not positive definite",
-        "legs.3.stroke": "min is 0.85 m, max is 0.65 m",
+        "legs.3.stroke": "min is 850 mm, max is 650 mm",
         "tool.axis": "is zero",
         "dynamics.gravity.3": "is NaN",
         "legs.3.base.point": "off the line of rod",

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable
+import re
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import TypeVar
@@ -38,6 +39,9 @@ SHOWN: dict[str, tuple[float, str]] = {
 }
 """Units that people read quantities in, and the factors to them from SI, by kind."""
 
+
+_NUMBER = r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?"
+"""As messages of the core write numbers."""
 
 _SPELLINGS = {
     "s": ("sec", "secs", "second", "seconds"),
@@ -96,6 +100,37 @@ def to_si(value: Value, kind: str, unit: str) -> Value:
     """
     n, d = _ratio(kind, unit)
     return value * n / d
+
+
+def in_units(text: str, units: object) -> str:
+    """A message whose lengths, angles and masses are in SI, with these in the units of a file.
+
+    `units` is the file's table by kind, whatever it holds: what is no unit of its kind stays in SI. Numbers
+    keep their precision; what stands in quotes is a name and is left alone.
+    """
+    table = units if isinstance(units, Mapping) else {}
+    parts = re.split(r'("[^"]*")', text)
+    for kind in ("length", "angle", "mass"):
+        unit = table.get(kind)
+        if not isinstance(unit, str) or unit not in UNITS[kind]:
+            continue
+        quantity = re.compile(rf"(\[[^\]]*\]|{_NUMBER}) {si_unit(kind)}(?![\w/^]| m\^)")
+
+        def converted(found: re.Match[str], kind: str = kind, unit: str = unit) -> str:
+            return re.sub(_NUMBER, lambda one: _rewritten(one[0], kind, unit), found[1]) + f" {unit}"
+
+        parts[::2] = [quantity.sub(converted, part) for part in parts[::2]]
+    return "".join(parts)
+
+
+def _rewritten(number: str, kind: str, unit: str) -> str:
+    """A written number of SI in another unit, as precise."""
+    value = from_si(float(number), kind, unit)
+    if "e" in number:
+        return f"{value:.{sum(char.isdigit() for char in number.split('e')[0])}g}"
+    n, d = _ratio(kind, unit)
+    decimals = len(number.partition(".")[2]) - round(math.log10(d / n))
+    return f"{value:.{max(decimals, 0)}f}"
 
 
 def from_si(value: Value, kind: str, unit: str) -> Value:

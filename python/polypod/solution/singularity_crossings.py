@@ -10,7 +10,7 @@ The findings are plain data that JSON holds; times in s, measures pure numbers, 
     near: list of {kind, leg, start, end, time, minimum, stays, freedoms}; intervals of known instants at
         which the measure of that kind is below the threshold, its least value and when; whether it is zero
         all the while, up to rounding
-    freedoms: that the locked actuators leave at the pose that is found or nearest, where it is singular; else 0
+    freedoms: that locked actuators leave at the pose found or nearest, where it is singular; else 0
     uncontrolled: degrees of freedom that the locked actuators leave at every pose, by design; crossings are
         then not sought
 """

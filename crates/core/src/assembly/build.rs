@@ -151,6 +151,9 @@ fn check_freedoms(mech: &Mechanism) -> Option<Fault> {
     (actuators < needed).then(|| Fault::new("legs", message))
 }
 
+/// What a leg with U joints at both ends should often be.
+const FREE_LEG: &str = "a leg that should rotate freely has a spherical joint at one end, UPS or SPU";
+
 /// That legs with U joints at both ends do not spin, and which ones would.
 fn about_universal_joints(mech: &Mechanism) -> String {
     let both = |leg: &&Leg| [leg.base_kind(), leg.platform.kind] == [JointKind::Universal; 2];
@@ -160,8 +163,7 @@ fn about_universal_joints(mech: &Mechanism) -> String {
     }
     format!(
         ". A leg with U joints at both ends (here {}) does not rotate about its own line, which takes a degree \
-         of freedom from the platform; a leg that should rotate freely has a spherical joint at one end, UPS \
-         or SPU",
+         of freedom from the platform; {FREE_LEG}",
         names.join(", ")
     )
 }
@@ -305,6 +307,8 @@ fn home_message(mech: &Mechanism, c: &Constraint, missed: f64) -> String {
         ConstraintKind::D => "its axis in the base must be perpendicular to its axis in the platform",
         ConstraintKind::E => "legs on one rod must keep the angle between their planes",
     };
+    let both_universal = [leg.base_kind(), leg.platform.kind] == [JointKind::Universal; 2];
+    let instead = if both_universal { format!("; {FREE_LEG}") } else { String::new() };
     let off = match c.kind {
         ConstraintKind::D => {
             format!(
@@ -314,7 +318,11 @@ fn home_message(mech: &Mechanism, c: &Constraint, missed: f64) -> String {
         }
         _ => format!("{missed:.3e} m"),
     };
-    format!("misses the constraint of leg \"{}\" ({}) by {off}: {meaning}{nearest}", leg.name, leg.letters())
+    format!(
+        "misses the constraint of leg \"{}\" ({}) by {off}: {meaning}{instead}{nearest}",
+        leg.name,
+        leg.letters()
+    )
 }
 
 fn make_rod(spec: &Spec, index: usize, rod: &RodSpec) -> Rod {
