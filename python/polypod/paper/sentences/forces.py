@@ -33,7 +33,11 @@ def coupled_forces(mech: Mechanism, pose: Array, constraint: Array, *, as_printe
 
 
 def coupled_share(
-    mech: Mechanism, pose: Array, twist: ArrayLike = 0.0, acceleration: ArrayLike = 0.0, wrench: Array | None = None
+    mech: Mechanism,
+    pose: Array,
+    twist: ArrayLike = 0.0,
+    acceleration: ArrayLike = 0.0,
+    wrench: Array | None = None,
 ) -> Array:
     """(N,): the greater of |f_c1|, |f_c3| over the greatest |f_ai|, where forces are determined; no unit.
 
@@ -43,7 +47,8 @@ def coupled_share(
     found = mech.inverse_dynamics(pose, twist, acceleration, wrench)
     coupled = coupled_forces(mech, pose, found.constraint)
     share = np.max(np.abs(coupled), axis=-1) / np.max(np.abs(found.forces), axis=-1)
-    return share[np.isfinite(share)]
+    known: Array = share[np.isfinite(share)]
+    return known
 
 
 def printed_share(mech: Mechanism, pose: Array, twist: Array, acceleration: Array) -> Array:
@@ -68,10 +73,10 @@ def parallel_wrench(mech: Mechanism, pose: Array) -> tuple[Array, Array]:
 
 
 def redundant_forces(mech: Mechanism, pose: Array, twist: Array, acceleration: Array) -> RedundantForces:
-    """Which reactions the redundant constraints leave open along states (N), and how far two choices differ."""
+    """Reactions that the redundant constraints leave open along states (N), chosen in two ways."""
     answer = mech.joint_reactions(pose, twist, acceleration)
     kinds = np.array([joint.kind for joint in answer.joints])
-    determinate = answer.determinate_in_joint.all(axis=0)
+    determinate = np.logical_and.reduce(answer.determinate_in_joint, axis=0)
     forces = np.where(determinate[:, :3], 0.0, 1.0)
     greatest = [
         np.max(np.abs(reactions[..., :3] * forces), axis=(-1, -2))

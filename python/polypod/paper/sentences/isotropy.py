@@ -19,7 +19,7 @@ SPACING = 0.025
 
 @dataclass(frozen=True)
 class LevelIsotropy:
-    """Isotropy over a horizontal grid of positions with the platform level, 1 where all directions are alike."""
+    """Isotropy over positions at one height with the platform level; 1 where all directions are alike."""
 
     height: float
     """Of o, m."""
@@ -44,9 +44,9 @@ def horizontal_rates(mech: Mechanism, pose: Array) -> Array:
 def horizontal_velocities(mech: Mechanism, pose: Array) -> Array:
     """(..., 2, n): v_x and v_y of o for each leg's rate of 1 m/s, the other legs at rest; no unit.
 
-    The transpose gives the active forces of a horizontal force at o, with the opposite sign, and the square of
-    a singular value is the horizontal compliance at o times the stiffness of a leg, if all legs have the same
-    and the rest is rigid. NaN where the legs do not control the platform.
+    The transpose gives the active forces that hold a horizontal force at o, but for the sign. The square of a
+    singular value is the horizontal compliance at o times the stiffness of a leg, if all legs have the same
+    stiffness and the rest is rigid. NaN where the legs do not control the platform.
     """
     rates = np.eye(mech.n_legs)
     twist = mech.platform_twist(pose[..., None, :, :], rates).twist
@@ -55,9 +55,10 @@ def horizontal_velocities(mech: Mechanism, pose: Array) -> Array:
 
 def isotropy(matrix: Array) -> Array:
     """(...): the least singular value over the greatest of matrices (..., a, b); NaN where they are."""
-    known = np.isfinite(matrix).all(axis=(-1, -2))
-    values = np.linalg.svd(np.where(known[..., None, None], matrix, np.eye(*matrix.shape[-2:])), compute_uv=False)
-    return np.where(known, values[..., -1] / values[..., 0], np.nan)
+    known = np.logical_and.reduce(np.isfinite(matrix), axis=(-1, -2), keepdims=True)
+    stand_in: Array = np.where(known, matrix, 1.0)
+    values = np.linalg.svd(stand_in, compute_uv=False)
+    return np.where(known[..., 0, 0], values[..., -1] / values[..., 0], np.nan)
 
 
 def level_isotropy(mech: Mechanism, height: float, spacing: float = SPACING) -> LevelIsotropy:

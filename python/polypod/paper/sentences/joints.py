@@ -54,7 +54,7 @@ def base_joints(mech: Mechanism, pose: Array) -> BaseJoints:
 
 
 def base_reactions(mech: Mechanism, pose: Array, twist: Array, acceleration: Array) -> tuple[Array, Array]:
-    """Pull along the leg (N, n), N, and couple (N, n), N m, in each base joint under the mechanism's own load.
+    """Pull along the leg (N, n), N, and couple (N, n), N m, in each base joint under the own load.
 
     The pull is positive where the joint keeps the leg from leaving the base. The couple is that without
     couples in the U joints at the platform, the paper's assumption: balance alone leaves it open [T47].

@@ -63,7 +63,7 @@ def upright_poses(mech: Mechanism, count: int = SAMPLES, seed: int = SEED) -> Ar
 def _upright(mech: Mechanism, uniform: Array, longest: float) -> Array:
     """(N, 4, 4): the upright ones of those with coordinates spread over a box that holds them all.
 
-    The middle of b_1 b_3 is that of B_1 B_3 plus the mean of r_1 and r_3, no longer than the longest leg. With
+    The middle of b_1 b_3 is that of B_1 B_3 plus the mean of r_1 and r_3, at most the longest leg away. With
     ψ = α + γ the trace of R is cos β + cos ψ (1 + cos β), above 1 for rotations below 90°.
     """
     alpha, beta, psi = np.pi * (uniform[:3] - 0.5)
@@ -84,7 +84,9 @@ def level_poses(mech: Mechanism, height: float, spacing: float) -> Array:
     reach = float(np.max(mech.stroke[:, 1])) + mech.characteristic_length
     steps = int(reach / spacing)
     line = spacing * np.arange(-steps, steps + 1)
-    pose = moved(mech.home, np.stack(np.meshgrid(line, line, [height], indexing="ij"), axis=-1).reshape(-1, 3))
+    pose = moved(
+        mech.home, np.stack(np.meshgrid(line, line, [height], indexing="ij"), axis=-1).reshape(-1, 3)
+    )
     return pose[mech.limits(pose).within]
 
 
@@ -103,6 +105,8 @@ def quantile(values: Array, share: float) -> Quantile:
     normal.
     """
     n = len(values)
-    ranks = n * share + norm.ppf(0.5 * (1.0 + CONFIDENCE)) * np.sqrt(n * share * (1.0 - share)) * np.array([-1, 1])
+    ranks = n * share + norm.ppf(0.5 * (1.0 + CONFIDENCE)) * np.sqrt(n * share * (1.0 - share)) * np.array(
+        [-1, 1]
+    )
     low, high = np.sort(values)[np.clip(ranks.round().astype(int), 0, n - 1)]
     return Quantile(float(np.quantile(values, share)), float(low), float(high))

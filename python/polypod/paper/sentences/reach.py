@@ -73,7 +73,7 @@ def reach(workspace: Workspace, origin: Array, directions: Array) -> Array:
 
 
 def largest_ball(workspace: Workspace) -> tuple[Array, float]:
-    """Centre (3,) and radius, m, of the largest ball of positions inside; both to about a step of the grid."""
+    """Centre (3,) and radius, m, of the largest ball of positions, both to about a step of the grid."""
     steps = [axis[1] - axis[0] for axis in workspace.axes]
     padded = np.pad(workspace.mask, 1)
     distance = distance_transform_edt(padded, sampling=steps)[1:-1, 1:-1, 1:-1]
@@ -118,14 +118,17 @@ def level_reach(mech: Mechanism, directions: Array) -> Array:
         return mech.limits(moved(mech.home, home + distance[..., None] * along)).within
 
     farthest = float(np.max(mech.stroke[:, 1])) + mech.characteristic_length
-    march = np.broadcast_to(np.arange(0.0, farthest, _MARCH), (len(directions), int(np.ceil(farthest / _MARCH))))
+    march = np.broadcast_to(
+        np.arange(0.0, farthest, _MARCH), (len(directions), int(np.ceil(farthest / _MARCH)))
+    )
     first = np.argmin(inside(march), axis=1)
     low, high = _MARCH * (first - 1.0), _MARCH * first.astype(float)
     for _ in range(_HALVINGS):
         middle = 0.5 * (low + high)
         within = inside(middle)
         low, high = np.where(within, middle, low), np.where(within, high, middle)
-    return low
+    distance: Array = low
+    return distance
 
 
 def tilts_at_home(mech: Mechanism) -> tuple[float, float]:

@@ -103,7 +103,9 @@ def ends_of(mech: Mechanism, motion: Motion) -> Ends:
         return float(np.max(np.abs(values[[0, -1]])) / np.max(np.abs(whole)))
 
     return Ends(
-        part(legs.rates, legs.rates), part(legs.accelerations, legs.accelerations), part(forces - held, forces)
+        part(legs.rates, legs.rates),
+        part(legs.accelerations, legs.accelerations),
+        part(forces - held, forces),
     )
 
 
@@ -123,11 +125,10 @@ def across_singularity(mech: Mechanism, start: Array, poses: Array) -> Pole:
     names = mech.coordinate_sets["natural"]
     scale = np.array([1.0 if name in ("p", "h") else mech.characteristic_length for name in names])
     ends = np.array([0.0, _DURATION])
+    times = np.linspace(0.0, _DURATION, INTERVALS + 1)
     for last in there[np.argsort(np.linalg.norm(scale * (there - first), axis=-1))]:
         curve = minimum_jerk(ends, np.stack([first, last]))
-        motion = Motion.along(
-            curve, np.linspace(*ends, INTERVALS + 1), names, set="natural", name="across a singularity"
-        )
+        motion = Motion.along(curve, times, names, set="natural", name="across a singularity")
         if mech.limits(states_along(mech, motion).pose).within.all():
             return _pole(mech, motion)
     raise UnsupportedError(f"{mech.name}: no straight motion inside the limits crosses a singularity")
