@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt
@@ -9,8 +11,7 @@ from scipy.ndimage import distance_transform_edt
 from polypod.answers.answer import Array
 from polypod.mechanism import Mechanism
 from polypod.paper.sentences.poses import moved
-from polypod.workspaces.search import workspace as find_workspace
-from polypod.workspaces.workspace import EDGE_OF_GRID, Workspace
+from polypod.workspaces.workspace import Workspace
 
 DIRECTIONS = 500
 """All over the sphere."""
@@ -25,10 +26,19 @@ _EDGE = 1e-9
 """By which a ray may miss a triangle, as a part of its sides: one through an edge must meet a side of it."""
 
 _MARCH = 0.005
-"""Steps, m, in which a level move is followed before its end is bisected: what ends it may begin again."""
+"""Steps, m, by which level moves are followed."""
 
-_HALVINGS = 40
-"""Of a step: to 5e-15 m."""
+_TILT_MARCH = np.radians(1.0)
+"""Steps, rad, by which tilts are followed."""
+
+_END = 1e-12
+"""Below which steps, m or rad, end."""
+
+_AZIMUTHS = 180
+"""At which tilts are followed at a time."""
+
+_ZOOMS = 3
+"""Times that the best azimuth is looked for, each within two steps of the one before: to 0.001°."""
 
 
 def circle(count: int = HORIZONTAL) -> Array:
@@ -111,29 +121,50 @@ def level_reach(mech: Mechanism, directions: Array) -> Array:
     To where the first limit is met.
     """
     home = mech.home[:3, 3]
-
-    def inside(distance: Array) -> NDArray[np.bool_]:
-        """(D, ...): of distances (D, ...)."""
-        along = directions.reshape(len(directions), *([1] * (distance.ndim - 1)), 3)
-        return mech.limits(moved(mech.home, home + distance[..., None] * along)).within
-
-    farthest = float(np.max(mech.stroke[:, 1])) + mech.characteristic_length
-    march = np.broadcast_to(
-        np.arange(0.0, farthest, _MARCH), (len(directions), int(np.ceil(farthest / _MARCH)))
+    return _first_limit(
+        mech, len(directions), _MARCH, lambda d, _: moved(mech.home, home + d[:, None] * directions)
     )
-    first = np.argmin(inside(march), axis=1)
-    low, high = _MARCH * (first - 1.0), _MARCH * first.astype(float)
-    for _ in range(_HALVINGS):
-        middle = 0.5 * (low + high)
-        within = inside(middle)
-        low, high = np.where(within, middle, low), np.where(within, high, middle)
-    distance: Array = low
-    return distance
 
 
 def tilts_at_home(mech: Mechanism) -> tuple[float, float]:
-    """The least and the greatest tilt of the tool axis that o kept at home allows, over all azimuths, rad."""
-    place = dict(zip(("x", "y", "z"), mech.home[:3, 3].tolist(), strict=True))
-    found = find_workspace(mech, ["azimuth", "tilt"], place)
-    limit = found.vertices[found.labels != found.label_names.index(EDGE_OF_GRID), 1]
-    return float(limit.min()), float(limit.max())
+    """The least and the greatest tilt of the tool axis that home's position of o allows, over azimuths, rad.
+
+    From home to where the first limit is met, with the tool tip in o.
+    """
+    tip = dict(zip(("tip_x", "tip_y", "tip_z"), mech.home[:3, 3].tolist(), strict=True))
+
+    def tilted(azimuth: Array) -> Array:
+        """(D,): tilts at azimuths (D,)."""
+
+        def pose(tilt: Array, guess: Array) -> Array:
+            x, y = np.sin(tilt) * np.cos(azimuth), np.sin(tilt) * np.sin(azimuth)
+            return mech.pose({**tip, "axis_x": x, "axis_y": y, "axis_z": np.cos(tilt)}, guess=guess)
+
+        return _first_limit(mech, len(azimuth), _TILT_MARCH, pose)
+
+    def best(of: Callable[[Array], np.intp]) -> float:
+        """The extreme tilt, looked for more and more narrowly about the best azimuth."""
+        azimuth, width = 0.0, np.pi
+        for _ in range(_ZOOMS):
+            at = azimuth + width * np.linspace(-1.0, 1.0, _AZIMUTHS)
+            tilts = tilted(at)
+            azimuth, width = float(at[of(tilts)]), 4.0 * width / _AZIMUTHS
+        return float(tilts[of(tilts)])
+
+    return best(np.argmin), best(np.argmax)
+
+
+def _first_limit(mech: Mechanism, count: int, step: float, pose_at: Callable[[Array, Array], Array]) -> Array:
+    """(count,): how far ways from home lead inside all limits, in the unit of `step`.
+
+    `pose_at` takes distances (count,) and the poses before them. Each way goes on by steps, halved where one
+    would leave the limits: a limit that is passed and met again within one is overlooked.
+    """
+    distance, steps = np.zeros(count), np.full(count, step)
+    pose = np.broadcast_to(mech.home, (count, 4, 4))
+    while steps.max() > _END:
+        trial = pose_at(distance + steps, pose)
+        within = mech.limits(trial).within
+        distance, steps = np.where(within, distance + steps, distance), np.where(within, steps, 0.5 * steps)
+        pose = np.where(within[:, None, None], trial, pose)
+    return distance

@@ -68,7 +68,8 @@ def with_error(of: Quantile, spec: str = ".2f") -> str:
 def median_and_tail(values: Array) -> str:
     """Median, the value that 95 % stay below, and the greatest of the samples."""
     middle, high = (quantile(values, share) for share in (0.5, 0.95))
-    return f"median {with_error(middle)}, 95 % below {with_error(high)}, greatest {values.max():.2g}"
+    told = (with_error(of, ".3f") for of in (middle, high))
+    return "median {}, 95 % below {}".format(*told) + f", greatest {values.max():.2g}"
 
 
 def percent(share: float, count: int) -> str:
