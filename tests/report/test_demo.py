@@ -54,6 +54,15 @@ def test_the_workspace_is_compared_with_the_print(demo):
     assert "lattice of lengths in steps of 20 mm" in table
 
 
+def test_the_sentences_are_judged(demo):
+    verdicts = demo.text.split("## The paper's sentences")[1]
+    assert "couple-constrained forces are quite small”: false in general" in verdicts
+    page = (demo.directory / "report.html").read_text(encoding="utf-8")
+    section = page.split("<h3>Sentences</h3>")[1].split("<section")[0]
+    assert section.count("<strong>") == verdicts.count("\n- “") > 10
+    assert "<td>the same with T_o in N mm</td>" in section
+
+
 def test_results_load_back(demo):
     mech = pp.load(EXAMPLE)
     expected = pp.solve(mech, pp.load_motion(EXAMPLE, mech))

@@ -1,6 +1,8 @@
-"""The paper's Tables I and III and its Section 4 in words and Markdown tables; every number is measured."""
+"""The paper's Tables I and III, Section 4 and sentences as Markdown; every number is measured."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -8,6 +10,11 @@ from polypod.errors import MissingEngineError
 from polypod.mechanism import Mechanism
 from polypod.motion.motion import Motion
 from polypod.paper.section4 import Section4, as_markdown
+from polypod.paper.sentences.isotropy import SPACING
+from polypod.paper.sentences.judgements import Judged, isotropy_markdown
+from polypod.paper.sentences.poses import CONFIDENCE, SAMPLES
+from polypod.paper.sentences.sentence import Sentence
+from polypod.paper.sentences.sentence import as_markdown as sentences_as_markdown
 from polypod.paper.table_i import fit_markdown, fit_table_i, table_i
 
 COMPARED = 81
@@ -50,6 +57,25 @@ def section4_markdown(found: Section4, figure: str) -> str:
 {figure} shows the first, coloured by what ends it. Its volume is
 {flood["volume"]:.3f} m³, give or take {share:.1g} %. The paper steps the lengths by 10 mm; that takes longer.
 """
+
+
+def sentences_markdown(of: Judged, sentences: Sequence[Sentence]) -> str:
+    """The paper's qualitative sentences with measures, numbers and verdicts."""
+    return f"""Random poses are {SAMPLES} upright ones within the strokes, uniform in the natural coordinates.
+In brackets, or after ±, are intervals of {100 * CONFIDENCE:.0f} %; the greatest of the samples is no bound.
+"Turned" is `{of.turned.name}`, the same machine with three base joints rotated.
+
+{sentences_as_markdown(sentences)}
+
+The first sentence at each height, over a grid of {1e3 * SPACING:.0f} mm in X and Y: median and least.
+
+{isotropy_markdown(of)}
+"""
+
+
+def verdicts_markdown(sentences: Sequence[Sentence]) -> str:
+    """The verdicts alone, as a list."""
+    return "\n".join(f"- “{s.words}”: {s.verdict}; {s.reason}." for s in sentences) + "\n"
 
 
 def table_iii_markdown(mech: Mechanism, motion: Motion, name: str) -> str:

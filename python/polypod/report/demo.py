@@ -15,8 +15,16 @@ from polypod import plots
 from polypod.mechanism import load
 from polypod.motion.motion_file import load_motion
 from polypod.paper.section4 import section4
+from polypod.paper.sentences.judgements import TURNED, Judged, judge
 from polypod.paper.table_i import MECHANISM
-from polypod.paper.tables import TABLE_II, section4_markdown, table_i_markdown, table_iii_markdown
+from polypod.paper.tables import (
+    TABLE_II,
+    section4_markdown,
+    sentences_markdown,
+    table_i_markdown,
+    table_iii_markdown,
+    verdicts_markdown,
+)
 from polypod.report.content import gather
 from polypod.report.page import render, save
 from polypod.solution.solution import Solution
@@ -79,10 +87,14 @@ def run_demo(directory: str | PathLike[str]) -> Demo:
     first, third = table_i_markdown(mech), table_iii_markdown(mech, motion, EXAMPLE)
     text = _summary(facts, path, f"## Table I\n\n{first}")
     text += f"\n## Workspace of Section 4\n\n{section4_markdown(found, '`fig3.png`')}"
-    text += f"\n## Table III\n\n{third}"
+    judged = Judged(mech, load(TURNED), motion, found.flood)
+    sentences = judge(judged)
+    text += f"\n## Table III\n\n{third}\n## The paper's sentences\n\n{verdicts_markdown(sentences)}"
+    text += "\nMeasures and numbers are in `report.html`.\n"
     (directory / "summary.md").write_text(text, encoding="utf-8")
     section = section4_markdown(found, "The figure under [Workspace](#workspace)")
     paper = [("Table I", first), ("Table II", TABLE_II), ("Table III", third), ("Section 4", section)]
+    paper.append(("Sentences", sentences_markdown(judged, sentences)))
     content = gather(mech, EXAMPLE, workspace=found.flood, paper=paper)
     save(render(content, "polypod demo"), directory / "report.html")
     return Demo(directory, (*files, "report.html", "summary.md"), facts, path, text)
