@@ -259,6 +259,20 @@ def test_reach_inside_a_cube_and_a_ball():
     np.testing.assert_allclose(found[-50:], 0.7, rtol=1e-12)  # through corners
 
 
+def test_rays_from_outside_meet_a_cube_or_miss_it():
+    cube = trimesh.creation.box((2.0, 2.0, 2.0))
+    directions, origin = sphere(2000), np.array([0.3, 0.2, 3.0])
+    down = directions[:, 2] < 0
+    with np.errstate(divide="ignore", invalid="ignore"):
+        slabs = (np.array([[-1.0], [1.0]])[..., None] - origin) / directions
+    near, far = slabs.min(axis=0).max(axis=-1), slabs.max(axis=0).min(axis=-1)
+    expected = np.where(down & (near < far), near, np.inf)
+    assert 0.01 < np.mean(np.isfinite(expected)) < 0.2
+    np.testing.assert_allclose(
+        reach_inside(cube.vertices, cube.faces, origin, directions), expected, rtol=1e-12
+    )
+
+
 def test_directions_are_even():
     directions = sphere()
     np.testing.assert_allclose(np.linalg.norm(directions, axis=-1), 1.0, rtol=1e-14)

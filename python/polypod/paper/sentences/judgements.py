@@ -239,7 +239,7 @@ def _joints(of: Judged) -> Iterator[Sentence]:
             ),
         ),
         Verdict.OPEN,
-        "no joint is given. R and S joints are asked for the same; the S joints that are left limit the poses",
+        "no joint is given. R and S joints are asked for alike; the S joints that are left limit the poses",
     )
     pull, couple = base_reactions(of.mech, *of.moving)
     rest = np.zeros((len(of.poses), 6))
