@@ -291,6 +291,16 @@ def test_dark_and_narrow_windows_are_readable(scheme, width, show, paper, screen
         assert contrast > 4.5, (selector, contrast)
 
 
+def test_no_tool_bar_lies_over_printed_charts(show, paper):
+    page = show(paper)
+    chart(page, FORCES)
+    page.emulate_media(media="print")
+    bars = "[...document.querySelectorAll('.modebar')].map(bar => getComputedStyle(bar).display)"
+    shown = page.evaluate(bars)
+    assert shown
+    assert set(shown) == {"none"}
+
+
 def test_the_page_prints(show, paper, screenshots):
     page = show(paper, scheme="dark")
     pdf = page.pdf(path=screenshots / "report-paper.pdf", prefer_css_page_size=True)

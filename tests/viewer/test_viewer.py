@@ -75,6 +75,24 @@ def test_any_mechanism_moves_by_coordinates_and_by_lengths(file):
     np.testing.assert_allclose(view.joints[0], view.frames[1 + len(mech.rod_names) + 1, :3, 3])
 
 
+@pytest.mark.parametrize("name", ["4-rpr", "4ups-up"])
+def test_with_redundant_actuators_legs_follow_the_coordinates(name):
+    mech = pp.load(name)
+    model = Model(mech)
+    before = mech.inverse_kinematics(model.pose).lengths
+    pose = model.pose.copy()
+    assert not any(model.moves_alone(leg) for leg in range(mech.n_legs))
+    assert not model.set_length(0, float(before[0]) + 1e-3)
+    assert "more actuators than degrees of freedom" in model.refusal
+    np.testing.assert_array_equal(model.pose, pose)
+    for coordinate in model.names:
+        now = float(mech.coordinates(model.pose, model.set)[coordinate])
+        assert model.set_coordinate(coordinate, now + 0.01), model.refusal
+    view = model.view()
+    assert np.isfinite(view.frames).all()
+    assert np.abs(view.lengths - before).max() > 1e-3
+
+
 def test_a_coordinate_alone_moves(model, mech):
     before = model.view().coordinates
     assert model.set_coordinate("h", 0.62)

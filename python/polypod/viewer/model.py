@@ -201,6 +201,10 @@ class Model:
             return self._refuse(f"No pose with {name} = {shown}: {status.message}.")
         return self._move(min(answers, key=lambda pose: float(np.linalg.norm(pose - self.pose))))
 
+    def moves_alone(self, leg: int) -> bool:
+        """Whether a leg can move while the other actuated ones are kept: not with redundant actuators."""
+        return bool(self.mech.actuated[leg]) and not self.mech.redundantly_actuated
+
     def set_length(self, leg: int, value: float) -> bool:
         """Moves one leg, the others kept, in the present assembly mode; whether there is such a pose."""
         name = self.mech.leg_names[leg]
@@ -208,6 +212,11 @@ class Model:
         what = drive.coordinate
         if not self.mech.actuated[leg]:
             return self._refuse(f"Leg {name} is passive: its {what} follows from the others.")
+        if not self.moves_alone(leg):
+            return self._refuse(
+                f"Leg {name} cannot move alone: there are more actuators than degrees of freedom, so that "
+                "others must move with it. Move a coordinate; the legs follow."
+            )
         if not np.isfinite(value) or value <= drive.least:
             return self._refuse(
                 f"The {what} of leg {name} cannot be {value} {si_unit(drive.coordinate_kind)}."

@@ -136,9 +136,13 @@ class Panel:
         low, high = (round(factor * end, 1) for end in model.length_range(leg))
         now = factor * float(model.mech.inverse_kinematics(model.pose).lengths[leg])
         start = min(max(round(now, 1), low), high)
-        active = bool(model.mech.actuated[leg])
+        active = model.moves_alone(leg)
         label = f"{model.mech.leg_names[leg]} / {leg_words.unit([drive])}"
-        hint = None if active else f"A passive leg: its {drive.coordinate} follows from the others."
+        hint = None
+        if not model.mech.actuated[leg]:
+            hint = f"A passive leg: its {drive.coordinate} follows from the others."
+        elif not active:
+            hint = "More actuators than degrees of freedom: no leg moves alone, all follow the coordinates."
         handle = self._gui.add_slider(label, low, high, _STEP, start, disabled=not active, hint=hint)
         slider = _Slider(handle, ("length", leg), factor, _STEP)
 

@@ -154,14 +154,10 @@ pub(super) fn kept<V: Lanes>(mech: &Mechanism, pose: &Pose<V>, mut codes: Codes<
     forwards(mech, pose, codes)
 }
 
-/// Whether all legs point the way in which fixed joints hold them: constraints leave both \[T9\].
+/// Whether all legs point the way in which fixed joints hold them.
 #[inline(always)]
-pub(super) fn forwards<V: Lanes>(mech: &Mechanism, pose: &Pose<V>, mut codes: Codes<V>) -> Codes<V> {
-    for direction in &mech.directions {
-        let ahead = leg::ahead(mech, direction, pose);
-        codes = codes.unless(ahead.greater(V::zero()), Status::Backwards);
-    }
-    codes
+pub(super) fn forwards<V: Lanes>(mech: &Mechanism, pose: &Pose<V>, codes: Codes<V>) -> Codes<V> {
+    codes.unless(leg::all_ahead(mech, pose), Status::Backwards)
 }
 
 /// Square of the tolerance for constraint values, which are lengths; a row that vanishes gives no distance.

@@ -33,6 +33,16 @@ pub fn ahead<S: Constant<T>, T: Real>(mech: &Mechanism<S>, direction: &Direction
     vectors(&mech.legs[direction.leg], pose).1.dot(d)
 }
 
+/// Whether no leg points backwards from a fixed joint: constraints leave both ways \[T9\].
+#[inline(always)]
+pub fn all_ahead<V: Ordered>(mech: &Mechanism<impl Constant<V>>, pose: &Pose<V>) -> V::Mask {
+    let mut all = V::one();
+    for direction in &mech.directions {
+        all = V::select(ahead(mech, direction, pose).greater(V::zero()), all, V::zero());
+    }
+    all.greater(V::zero())
+}
+
 /// Foot of the strut, base axes.
 #[inline(always)]
 pub fn foot<T: Real>(leg: &Leg<impl Constant<T>>, p: &Position<T>) -> Vec3<T> {

@@ -109,8 +109,7 @@ pub(crate) fn is_possible(mech: &Mechanism, pose: &Pose<f64>) -> bool {
     let has_length =
         |leg: &Leg| leg::position(leg, pose).length > RANK_TOLERANCE * mech.characteristic_length;
     let reaches = |leg: &Leg| leg::position(leg, pose).coordinate.is_finite();
-    let forwards = mech.directions.iter().all(|direction| leg::ahead(mech, direction, pose) > 0.0);
-    forwards && mech.legs.iter().all(|leg| has_length(leg) && reaches(leg))
+    leg::all_ahead(mech, pose) && mech.legs.iter().all(|leg| has_length(leg) && reaches(leg))
 }
 
 /// The pose that satisfies `constraints`, found from `start` by damped Gauss-Newton steps of least size, or

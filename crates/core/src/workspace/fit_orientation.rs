@@ -104,13 +104,12 @@ fn gradient(mech: &Mechanism, limit: &Limit, pose: &Pose<f64>) -> Vec3<f64> {
 /// Whether no leg points backwards and a pose keeps the limits of conditioning and force; the latter at rest
 /// under the mechanism's own load.
 fn checked(mech: &Mechanism, pose: &Pose<f64>) -> bool {
-    let forwards = mech.directions.iter().all(|direction| leg::ahead(mech, direction, pose) > 0.0);
     let kept = |limit: &Limit| {
         let forces = matches!(limit.measure, Measure::Force { .. }).then(|| forces_at_rest(mech, pose));
         limit.margin(mech, pose, forces.as_deref()) >= 0.0
     };
     let checked = |l: &&Limit| matches!(l.measure, Measure::Conditioning | Measure::Force { .. });
-    forwards && mech.limits.iter().filter(checked).all(kept)
+    leg::all_ahead(mech, pose) && mech.limits.iter().filter(checked).all(kept)
 }
 
 /// Active forces at rest under the mechanism's own load, N.

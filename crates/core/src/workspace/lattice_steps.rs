@@ -62,10 +62,7 @@ impl Room<'_> {
             inside = V::select(V::lit(low).at_most(o[k]), inside, V::zero());
             inside = V::select(o[k].at_most(V::lit(high)), inside, V::zero());
         }
-        for direction in &self.mech.directions {
-            let ahead = leg::ahead(self.mech, direction, pose);
-            inside = V::select(ahead.greater(V::zero()), inside, V::zero());
-        }
+        inside = V::select(leg::all_ahead(self.mech, pose), inside, V::zero());
         let mut seen = LegCache::default();
         for limit in &self.mech.limits {
             if is_of_joint(limit) {
