@@ -11,6 +11,7 @@ _Array = NDArray[np.float64]
 _Table = dict[str, NDArray[Any]]
 
 __all__ = [
+    "SINGULAR",
     "Axes",
     "Chart",
     "Faults",
@@ -36,6 +37,7 @@ __all__ = [
 ]
 
 __version__: str
+SINGULAR: float
 
 class Faults(Exception):
     """All faults of a mechanism as (place, message)."""

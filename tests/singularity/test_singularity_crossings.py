@@ -75,7 +75,7 @@ def test_a_rest_at_a_singular_pose_is_one_finding():
     q = {name: np.full(21, value) for name, value in QUARTER.items()}
     findings = pp.solve(GOUGH, Motion.through(time, q, set="pose")).singularities
     assert findings["crossings"] == []
-    assert [(p["start"], p["end"], p["stays"]) for p in findings["near"]] == [(0.0, 1.0, True)]
+    assert [(p["start"], p["end"], p["stays"]) for p in findings["near"]] == [(0.0, 1.0, [[0.0, 1.0]])]
 
 
 def test_near_passages_have_their_own_kind_and_leg():

@@ -9,8 +9,8 @@ use polypod_core::forward_kinematics::newton::{asked, error, forward_kinematics,
 use polypod_core::kinematics::coordinate_sets::{MAX_COORDINATES, Set, Values};
 use polypod_core::kinematics::jacobian::scaled_jacobian;
 use polypod_core::kinematics::leg;
+use polypod_core::kinematics::singular::SINGULAR;
 use polypod_core::mobility::independent_coordinates;
-use polypod_core::mobility::singularity::TOLERANCE;
 use polypod_core::model::mechanism::Mechanism;
 use polypod_core::model::status::Status;
 use polypod_core::number::order::{larger, largest, smaller};
@@ -279,7 +279,7 @@ fn a_pose_with_a_leg_backwards_in_a_fixed_joint_is_none() {
             batch::joint_reactions(&mech, &states, &Loads::Own, 1.0),
             batch::limits(&mech, &states, &Loads::Own),
             batch::platform_twist(&mech, &poses, &values),
-            batch::singularities(&mech, &poses, 1.0, TOLERANCE),
+            batch::singularities(&mech, &poses, 1.0, SINGULAR),
             batch::coordinate_values(&mech, &Set::Pose, &poses),
         ] {
             // A broken constraint is reported first.

@@ -7,7 +7,8 @@ use nalgebra::Matrix6;
 use polypod_core::kinematics::constraint;
 use polypod_core::kinematics::jacobian;
 use polypod_core::kinematics::leg;
-use polypod_core::mobility::singularity::{self, Kind, TOLERANCE, determinant, singularity};
+use polypod_core::kinematics::singular::SINGULAR;
+use polypod_core::mobility::singularity::{self, Kind, determinant, singularity};
 use polypod_core::model::mechanism::{ConstraintKind, Mechanism};
 use polypod_core::number::order::larger;
 use polypod_core::spatial::{Mat3, Motion, Pose, Twist};
@@ -69,7 +70,7 @@ fn the_legs_notice_the_least_twist_by_the_smallest_singular_value() {
     for mech in mechanisms() {
         let scale = mech.characteristic_length;
         for state in states(&mech, 4, 23) {
-            let s = singularity(&mech, &state.pose, scale, TOLERANCE);
+            let s = singularity(&mech, &state.pose, scale, SINGULAR);
             assert_eq!((s.kind, s.leg, s.uncontrolled), (Kind::None, None, 0), "{}", mech.name);
             let [legs, constraints] = noticed(&mech, &state.pose, &s.twist);
             assert!((legs - s.conditioning.sigma_min).abs() < 1e-11, "{}", mech.name);
@@ -96,9 +97,9 @@ fn all_constraints_count_not_those_in_j_alone() {
     // J with one constraint twice is singular, while all of them together hold the platform.
     let mut mech = with_leg("RPR", 9);
     let state = states(&mech, 1, 3)[0];
-    let before = singularity(&mech, &state.pose, mech.characteristic_length, TOLERANCE);
+    let before = singularity(&mech, &state.pose, mech.characteristic_length, SINGULAR);
     mech.independent[1] = mech.independent[0];
-    let s = singularity(&mech, &state.pose, mech.characteristic_length, TOLERANCE);
+    let s = singularity(&mech, &state.pose, mech.characteristic_length, SINGULAR);
     assert_eq!((s.kind, s.determinant, s.uncontrolled), (Kind::DependentRows, 0.0, 0));
     assert!((s.conditioning.sigma_min - before.conditioning.sigma_min).abs() < 1e-12);
     assert!(singularity::smallest(&mech, &state.pose, mech.characteristic_length) < 1e-12);
@@ -111,7 +112,7 @@ fn a_platform_without_its_constraints_is_a_constraint_singularity() {
     let state = states(&mech, 1, 3)[0];
     let first = mech.constraints[0];
     mech.constraints.iter_mut().for_each(|c| *c = first);
-    let s = singularity(&mech, &state.pose, mech.characteristic_length, TOLERANCE);
+    let s = singularity(&mech, &state.pose, mech.characteristic_length, SINGULAR);
     let lost = mech.independent.len() - 1;
     assert_eq!((s.kind, s.uncontrolled), (Kind::Constraint, lost));
     assert_eq!(s.conditioning.sigma_min, 0.0);

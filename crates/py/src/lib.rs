@@ -57,6 +57,7 @@ fn use_instructions(name: &str) -> bool {
 #[pymodule]
 fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add("__version__", env!("CARGO_PKG_VERSION"))?;
+    m.add("SINGULAR", polypod_core::kinematics::singular::SINGULAR)?;
     m.add("Faults", m.py().get_type::<faults::Faults>())?;
     m.add_class::<arrays::PyAxes>()?;
     m.add_class::<mechanism::PyMechanism>()?;

@@ -1,8 +1,8 @@
 //! The chart that a simulation integrates in, one state at a time.
 
 use numpy::{PyArray1, PyArrayMethods};
-use polypod_core::batch::{SINGULAR_PIVOTS, pose_of};
-use polypod_core::dynamics::forward_dynamics::forward_dynamics;
+use polypod_core::batch::pose_of;
+use polypod_core::dynamics::forward_dynamics::{SINGULAR_BALANCE, forward_dynamics};
 use polypod_core::dynamics::inverse_dynamics::load_in_base;
 use polypod_core::kinematics::chart::{Chart, ChartPoint};
 use polypod_core::model::spec::Axes;
@@ -97,7 +97,7 @@ impl PyChart {
         let push: Vec<f64> = mech.actuated().map(|(k, _)| forces[k]).collect();
         let load = load_in_base(load, axes, &place.pose);
         let driven = forward_dynamics(mech, &place.pose, &place.twist, &push, load);
-        if !(driven.pivots > SINGULAR_PIVOTS) {
+        if !(driven.pivots > SINGULAR_BALANCE) {
             return Ok(PyArray1::from_vec(py, none));
         }
         let mut rates = y[self.chart.freedoms()..].to_vec();

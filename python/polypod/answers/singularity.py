@@ -9,13 +9,14 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from polypod import _core
 from polypod.answers.answer import Answer, Array, Codes
 from polypod.answers.singularity_kind import SingularityKind as SingularityKind
 
 Kinds = NDArray[np.int8]
 
-TOLERANCE = 1e-6
-"""A measure of nearness (a pure number) up to which a pose is singular: poses are as exact as that."""
+TOLERANCE = _core.SINGULAR
+"""A measure of nearness (a pure number) up to which a pose is singular: poses are as exact as that [T79]."""
 
 NEAR_SINGULAR = 0.01
 """Smallest singular value (a pure number) below which a pose is called nearly singular."""

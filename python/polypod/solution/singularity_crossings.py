@@ -8,8 +8,9 @@ The findings are plain data that JSON holds; times in s, measures pure numbers, 
         jump of the states and no singular pose is known in between; `kind` is then UNKNOWN. `between`: the
         known instants around it. Where the motion stays at singular poses there are none: `near` tells.
     near: list of {kind, leg, start, end, time, minimum, stays, freedoms}; intervals of known instants at
-        which the measure of that kind is below the threshold, its least value and when; whether it is zero
-        all the while, up to rounding
+        which the measure of that kind is below the threshold, its least value and when: at the first
+        singular pose, where there is one. `stays`: list of [start, end], the parts of it in which the motion
+        stays at poses that are singular in that way
     freedoms: that locked actuators leave at the pose found or nearest, where it is singular; else 0
     uncontrolled: degrees of freedom that the locked actuators leave at every pose, by design; crossings are
         then not sought
@@ -25,7 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from polypod import _core
-from polypod.answers.singularity import NEAR_SINGULAR, Determinant, SingularityKind
+from polypod.answers.singularity import NEAR_SINGULAR, TOLERANCE, Determinant, SingularityKind
 from polypod.files.units import instant
 from polypod.mechanism import Mechanism
 from polypod.motion.motion import Motion
@@ -43,11 +44,6 @@ NEAREST = 1e-7
 
 RESOLUTION = 1e-6
 """Share of the motion's duration below which two zeros are one that is touched: rounding makes two of one."""
-
-
-SINGULAR = 1e-6
-"""Measure below which a pose is singular: where constraints depend on one another, poses that follow from
-coordinates are off by the root of rounding."""
 
 CHUNK = 20_000
 """Poses analysed at once: memory does not grow with what is not kept."""
@@ -68,53 +64,72 @@ STAYS = 3
 
 @dataclass(frozen=True)
 class _Known:
-    """Instants, poses and det J with its rate, along a motion."""
+    """Instants along a motion: poses, det J with its rate, and the measures of singularity."""
 
     time: Array
     pose: Array
     determinant: Array
     rate: Array
+    measures: dict[str, NDArray[Any]]
+
+    @classmethod
+    def at(cls, mech: Mechanism, time: Array, pose: Array, determinant: Determinant) -> _Known:
+        time, pose, det, rate = map(
+            np.ascontiguousarray, (time, pose, determinant.determinant, determinant.rate)
+        )
+        return cls(time, pose, det, rate, _measured(mech, pose))
 
     def and_also(self, other: _Known) -> _Known:
-        time = np.concatenate([self.time, other.time])
-        order = np.argsort(time, kind="stable")
-        pairs = (
-            (self.pose, other.pose),
-            (self.determinant, other.determinant),
-            (self.rate, other.rate),
+        order = np.argsort(np.concatenate([self.time, other.time]), kind="stable")
+
+        def merged(ours: NDArray[Any], others: NDArray[Any]) -> NDArray[Any]:
+            return np.concatenate([ours, others])[order]
+
+        return _Known(
+            merged(self.time, other.time),
+            merged(self.pose, other.pose),
+            merged(self.determinant, other.determinant),
+            merged(self.rate, other.rate),
+            {name: merged(values, other.measures[name]) for name, values in self.measures.items()},
         )
-        return _Known(time[order], *(np.concatenate(pair)[order] for pair in pairs))
+
+
+def _measured(mech: Mechanism, poses: Array) -> dict[str, NDArray[Any]]:
+    """What of singularity analysis is looked at here, of poses (n, 4, 4): the rest of it is not kept."""
+    parts = []
+    for first in range(0, max(len(poses), 1), CHUNK):
+        part = mech.singularity(poses[first : first + CHUNK])
+        parts.append([getattr(part, name) for name in _MEASURES])
+    columns = map(np.concatenate, zip(*parts, strict=True))
+    return dict(zip(_MEASURES, columns, strict=True))
 
 
 def find_passages(
     mech: Mechanism, motion: Motion, pose: Array, determinant: Determinant, threshold: float = NEAR_SINGULAR
 ) -> dict[str, Any]:
     """Singular poses that a motion, solved at its samples, meets: the findings described above."""
-    known = _Known(*map(np.ascontiguousarray, (motion.time, pose, determinant.determinant, determinant.rate)))
-    uncontrolled, crossings = mech.mobility().uncontrolled, []
-    stays = _stays(mech, known)
-    if not uncontrolled:
+    known = _Known.at(mech, motion.time, pose, determinant)
+    if not mech.mobility().uncontrolled:
         known = _settled(mech, motion, known)
-        crossings = [*_crossings(mech, known, stays)]
-    return {
-        "threshold": threshold,
-        "uncontrolled": uncontrolled,
-        "crossings": crossings,
-        "near": [*_near(mech, known, threshold, stays)],
-    }
+    return _findings(mech, known, motion.time, threshold)
 
 
 def sampled_passages(
     mech: Mechanism, time: Array, pose: Array, determinant: Determinant, threshold: float = NEAR_SINGULAR
 ) -> dict[str, Any]:
     """Singular poses between states known at their instants only: zeros between them are those of cubics."""
-    known = _Known(*map(np.ascontiguousarray, (time, pose, determinant.determinant, determinant.rate)))
-    uncontrolled, stays = mech.mobility().uncontrolled, _stays(mech, known)
+    return _findings(mech, _Known.at(mech, time, pose, determinant), time, threshold)
+
+
+def _findings(mech: Mechanism, known: _Known, samples: Array, threshold: float) -> dict[str, Any]:
+    uncontrolled = mech.mobility().uncontrolled
+    near = [*_near(mech, known, samples, threshold)]
+    stays = [interval for passage in near for interval in passage["stays"]]
     return {
         "threshold": threshold,
         "uncontrolled": uncontrolled,
         "crossings": [] if uncontrolled else [*_crossings(mech, known, stays)],
-        "near": [*_near(mech, known, threshold, stays)],
+        "near": near,
     }
 
 
@@ -145,21 +160,11 @@ def _evaluated(mech: Mechanism, motion: Motion, known: _Known, times: Array) -> 
         branch=motion.branch,
         guess=known.pose[solved][np.maximum(before, 0)],
     )
-    det = mech.determinant(state.pose, state.twist)
-    return _Known(times, state.pose, det.determinant, det.rate)
+    return _Known.at(mech, times, state.pose, mech.determinant(state.pose, state.twist))
 
 
-Stays = list[tuple[float, float]]
-
-
-def _stays(mech: Mechanism, samples: _Known) -> Stays:
-    """Intervals of the samples at which the motion stays at singular poses."""
-    singular = _measured(mech, samples.pose)["kind"] > SingularityKind.NONE
-    runs = [(start, end) for start, end in _runs(singular) if end - start >= STAYS]
-    return [(float(samples.time[start]), float(samples.time[end - 1])) for start, end in runs]
-
-
-def _crossings(mech: Mechanism, known: _Known, stays: Stays) -> Iterator[dict[str, Any]]:
+def _crossings(mech: Mechanism, known: _Known, stays: list[list[float]]) -> Iterator[dict[str, Any]]:
+    """Zeros of det J, but for those while the motion stays at singular poses, which rounding chooses."""
     solved = np.isfinite(known.determinant)
     time, poses = known.time[solved], known.pose[solved]
     if len(time) < 2:
@@ -167,11 +172,12 @@ def _crossings(mech: Mechanism, known: _Known, stays: Stays) -> Iterator[dict[st
     resolution = RESOLUTION * (known.time[-1] - known.time[0])
     touched = -2
     for zero, crosses in _core.zeros(known.time, known.determinant, known.rate, resolution):
-        nearest = int(np.argmin(np.abs(time - zero)))
         if any(start - resolution <= zero <= end + resolution for start, end in stays):
             continue
+        index = int(np.clip(np.searchsorted(time, zero, side="right"), 1, len(time) - 1))
+        nearest = index - int(zero - time[index - 1] < time[index] - zero)
         settled = bool(abs(time[nearest] - zero) <= resolution)
-        at = mech.singularity(poses[nearest], tolerance=SINGULAR)
+        at = mech.singularity(poses[nearest])
         kind, leg = int(at.kind), int(at.leg)
         found = settled and kind > SingularityKind.NONE
         if not crosses:
@@ -179,7 +185,6 @@ def _crossings(mech: Mechanism, known: _Known, stays: Stays) -> Iterator[dict[st
             again, touched = nearest == touched + 1, nearest if found else touched
             if again or not found:
                 continue
-        index = int(np.clip(np.searchsorted(time, zero, side="right"), 1, len(time) - 1))
         yield {
             "time": float(zero),
             "kind": SingularityKind(kind if found else SingularityKind.UNKNOWN).name,
@@ -194,9 +199,9 @@ def _crossings(mech: Mechanism, known: _Known, stays: Stays) -> Iterator[dict[st
 # --- near passages ------------------------------------------------------------------------------------------
 
 
-def _near(mech: Mechanism, known: _Known, threshold: float, stays: Stays) -> Iterator[dict[str, Any]]:
+def _near(mech: Mechanism, known: _Known, samples: Array, threshold: float) -> Iterator[dict[str, Any]]:
     """Intervals in which a measure of nearness is below the threshold, in the order of time."""
-    at = _measured(mech, known.pose)
+    at = known.measures
     of_constraints = np.isin(at["kind"], (SingularityKind.CONSTRAINT, SingularityKind.CONSTRAINT_VANISHES))
     measures: list[tuple[SingularityKind, str | None, Array]] = [
         # Where constraints are lost, so is what the actuators hold: that is one singularity.
@@ -209,47 +214,38 @@ def _near(mech: Mechanism, known: _Known, threshold: float, stays: Stays) -> Ite
         measures.append((SingularityKind.STRUT_ACROSS_RAIL, leg, np.abs(at["transmission"][:, i])))
     found = []
     for kind, of_leg, measure in measures:
-        runs = [
-            (start, end, start + int(np.argmin(measure[start:end])))
-            for start, end in _runs(measure < threshold)
-        ]
-        vanishing = _vanishing(mech, known.pose[[least for *_, least in runs]], threshold)
-        for (start, end, least), vanishes in zip(runs, vanishing, strict=True):
-            of_constraint = kind == SingularityKind.CONSTRAINT and vanishes is not None
-            singular = measure[start:end] <= SINGULAR
-            first, last = float(known.time[start]), float(known.time[end - 1])
+        singular = _runs(measure <= TOLERANCE)
+        held = [run for run in singular if _samples_in(samples, known.time, run) >= STAYS]
+        for start, end in _runs(measure < threshold):
+            stays = [run for run in held if start <= run[0] and run[1] <= end]
+            # Of poses that are all singular rounding would choose the nearest.
+            least = stays[0][0] if stays else start + int(np.argmin(measure[start:end]))
+            vanishing = kind == SingularityKind.CONSTRAINT and _vanishing(mech, known.pose[least], threshold)
             found.append(
                 {
-                    "kind": (SingularityKind.CONSTRAINT_VANISHES if of_constraint else kind).name,
-                    "leg": vanishes if of_constraint else of_leg,
-                    "start": first,
-                    "end": last,
+                    "kind": (SingularityKind.CONSTRAINT_VANISHES if vanishing else kind).name,
+                    "leg": vanishing or of_leg,
+                    "start": float(known.time[start]),
+                    "end": float(known.time[end - 1]),
                     "time": float(known.time[least]),
                     "minimum": float(measure[least]),
-                    "stays": bool(singular.all()) and any(first <= a and b <= last for a, b in stays),
-                    "freedoms": int(at["uncontrolled"][least]) if singular.any() else 0,
+                    "stays": [[float(known.time[a]), float(known.time[b - 1])] for a, b in stays],
+                    "freedoms": int(at["uncontrolled"][least]) if measure[least] <= TOLERANCE else 0,
                 }
             )
     yield from sorted(found, key=lambda passage: (passage["start"], passage["kind"], passage["leg"] or ""))
 
 
-def _measured(mech: Mechanism, poses: Array) -> dict[str, NDArray[Any]]:
-    """What of singularity analysis is looked at here, of poses (n, 4, 4): the rest of it is not kept."""
-    parts = []
-    for first in range(0, max(len(poses), 1), CHUNK):
-        part = mech.singularity(poses[first : first + CHUNK], tolerance=SINGULAR)
-        parts.append([getattr(part, name) for name in _MEASURES])
-    return {
-        name: np.concatenate(columns)
-        for name, columns in zip(_MEASURES, zip(*parts, strict=True), strict=True)
-    }
+def _samples_in(samples: Array, time: Array, run: tuple[int, int]) -> int:
+    """How many samples there are in a run of known instants."""
+    first = np.searchsorted(samples, time[run[0]])
+    return int(np.searchsorted(samples, time[run[1] - 1], side="right") - first)
 
 
-def _vanishing(mech: Mechanism, poses: Array, threshold: float) -> list[str | None]:
-    """The leg whose constraint nearly vanishes at each pose (n, 4, 4), if one does."""
-    near = mech.singularity(poses, tolerance=threshold)
-    vanish = near.kind == SingularityKind.CONSTRAINT_VANISHES
-    return [mech.leg_names[leg] if of else None for leg, of in zip(near.leg, vanish, strict=True)]
+def _vanishing(mech: Mechanism, pose: Array, threshold: float) -> str | None:
+    """The leg whose constraint nearly vanishes at a pose (4, 4), if one does."""
+    near = mech.singularity(pose, tolerance=threshold)
+    return mech.leg_names[int(near.leg)] if near.kind == SingularityKind.CONSTRAINT_VANISHES else None
 
 
 def _runs(below: NDArray[np.bool_]) -> list[tuple[int, int]]:
@@ -280,8 +276,7 @@ def warnings_of(findings: dict[str, Any]) -> list[str]:
         )
     for passage in findings["near"]:
         if passage["stays"]:
-            start, end = instant(passage["start"]), instant(passage["end"])
-            notes.append(f"the motion stays at singular poses from {start} to {end}{_meaning(passage)}")
+            notes.append(f"the motion {_stay(passage, findings['threshold'])}{_meaning(passage)}")
             continue
         when = (
             f"from {instant(passage['start'])} to {instant(passage['end'])}"
@@ -293,6 +288,17 @@ def warnings_of(findings: dict[str, Any]) -> list[str]:
             f"{passage['minimum']:.2g} (near is below {findings['threshold']:g}){_meaning(passage)}"
         )
     return notes
+
+
+def _stay(passage: dict[str, Any], threshold: float) -> str:
+    """From when to when a motion stays at singular poses, and is near them."""
+    spans = [f"from {instant(start)} to {instant(end)}" for start, end in passage["stays"]]
+    text = "stays at singular poses " + " and ".join(spans)
+    whole = [passage["start"], passage["end"]]
+    if passage["stays"] == [whole]:
+        return text
+    start, end = map(instant, whole)
+    return f"{text}, and is near them from {start} to {end} (near is below {threshold:g})"
 
 
 def _meaning(finding: dict[str, Any]) -> str:

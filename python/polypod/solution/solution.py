@@ -6,6 +6,7 @@ import csv
 import itertools
 import json
 import math
+from contextlib import closing
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
@@ -19,6 +20,7 @@ from polypod.answers.status import Status
 from polypod.errors import Fault, SolutionError
 from polypod.files.text import read_text, replacing
 from polypod.files.units import instant
+from polypod.solution.netcdf_store import WrittenInPlace
 from polypod.solution.singularity_crossings import warnings_of
 
 _FORMAT = "polypod solution 1"
@@ -150,7 +152,8 @@ def _write_netcdf(dataset: xr.Dataset, path: Path) -> None:
     empty = [outline for outline in _outlines(dataset) if 0 in outline["shape"]]
     file = dataset.drop_vars([outline["name"] for outline in empty])
     file = file.assign_attrs(polypod_format=_FORMAT, polypod_empty=_json(empty))
-    file.to_netcdf(path, engine="scipy")
+    with closing(WrittenInPlace(str(path), mode="w")) as store:
+        file.dump_to_store(store)
 
 
 def _read_netcdf(path: Path) -> xr.Dataset:

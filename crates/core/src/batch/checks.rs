@@ -4,6 +4,7 @@ use super::block::{self, At, Codes};
 use crate::dynamics::forward_dynamics::square;
 use crate::kinematics::constraint;
 use crate::kinematics::leg::{self, Position};
+use crate::kinematics::singular::{self, WORKING_PRECISION};
 use crate::limits::margins::LegCache;
 use crate::model::limit::Limit;
 use crate::model::mechanism::{Constraint, Leg, Mechanism, Turning};
@@ -16,11 +17,8 @@ use crate::spatial::{Mat3, Motion, Pose, Twist, Vec3};
 const ROTATION_TOLERANCE: f64 = 1e-6;
 
 /// How far a pose may miss a constraint, relative to the characteristic length; for twists and accelerations
-/// relative to their own size.
+/// relative to their own size. Poses are judged to be singular with the same margin, [`singular::SINGULAR`].
 pub const CONSTRAINT_TOLERANCE: f64 = 1e-6;
-
-/// Pivot ratio of the scaled Jacobian below which it is singular to working precision.
-pub const SINGULAR_PIVOTS: f64 = 1e-12;
 
 /// Sine of the angle between a leg and the axis of its universal joint, and length of a leg relative to the
 /// characteristic length, below which the leg has no frame.
@@ -257,11 +255,21 @@ pub(super) fn joint_limits(mech: &Mechanism) -> impl Iterator<Item = &Limit> {
     mech.limits.iter().take_while(|limit| limit.status() != Status::Ok)
 }
 
-/// Whether a system was solved: the mechanism is controlled, the pivots tell a regular matrix, all is finite.
+/// Whether a system at a pose was solved: the mechanism is controlled, no constraint is lost, the pivots tell
+/// a regular matrix, all is finite \[T79\].
 #[inline(always)]
-pub(super) fn solved<V: Lanes>(mech: &Mechanism, solution: &[V], pivots: V, codes: Codes<V>) -> Codes<V> {
-    let least = if mech.mobility.uncontrolled == 0 { SINGULAR_PIVOTS } else { f64::INFINITY };
-    codes.unless(pivots.greater(V::lit(least)), Status::Singular).unless(finite(solution), Status::Singular)
+pub(super) fn solved<V: Lanes>(
+    mech: &Mechanism,
+    pose: &Pose<V>,
+    solution: &[V],
+    pivots: V,
+    codes: Codes<V>,
+) -> Codes<V> {
+    let least = if mech.mobility.uncontrolled == 0 { WORKING_PRECISION } else { f64::INFINITY };
+    codes
+        .unless(singular::are_independent(mech, pose), Status::Singular)
+        .unless(pivots.greater(V::lit(least)), Status::Singular)
+        .unless(finite(solution), Status::Singular)
 }
 
 /// One number of each actuated leg, of as many as there are legs.

@@ -6,7 +6,8 @@ use super::checks::{
     check_legs, finite, forwards, is_rotation, pose_at, raw_pose, then, with_legs, with_motion,
 };
 use crate::kinematics::coordinate_sets::{self, MAX_COORDINATES, Set, Values};
-use crate::kinematics::dependent_coordinates::{self, Conditions, CoordinateState, Dependent, FOLD_PIVOTS};
+use crate::kinematics::dependent_coordinates::{self, Conditions, CoordinateState, Dependent};
+use crate::kinematics::singular::SINGULAR;
 use crate::model::mechanism::Mechanism;
 use crate::model::status::Status;
 use crate::number::lanes::Lanes;
@@ -70,7 +71,7 @@ pub fn states(mech: &Mechanism, input: &Coordinates, n: usize) -> Table {
                 _ => last,
             };
             let state =
-                dependent_coordinates::state(mech, &input.set, &q, &mask, input.branch, &guess, FOLD_PIVOTS);
+                dependent_coordinates::state(mech, &input.set, &q, &mask, input.branch, &guess, SINGULAR);
             let state = checked(mech, state, all_given);
             let jumped = input.continued && state.status == Status::Ok && state.branch * branch < 0.0;
             let status = if jumped { Status::BranchJump } else { state.status };
@@ -198,7 +199,7 @@ work! {
         start: &'a Values<f64>,
         wanted: Mask<V>,
     } -> Conditions<V> {
-        dependent_coordinates::solve_dependent(mech, set, q, dependent, start, wanted, FOLD_PIVOTS).0
+        dependent_coordinates::solve_dependent(mech, set, q, dependent, start, wanted, SINGULAR).0
     }
 }
 work! {

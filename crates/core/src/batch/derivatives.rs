@@ -11,9 +11,9 @@ use crate::dynamics::force_balance::UnitForceResponse;
 use crate::dynamics::inverse_dynamics::resultant;
 use crate::dynamics::regressor::{self, Regressor};
 use crate::kinematics::coordinate_sets::{MAX_COORDINATES, Set};
-use crate::kinematics::dependent_coordinates::DEPENDENT_PIVOTS;
 use crate::kinematics::leg;
 use crate::kinematics::rows::RowNumbers;
+use crate::kinematics::singular::SINGULAR;
 use crate::model::mechanism::Mechanism;
 use crate::model::status::Status;
 use crate::number::lanes::Lanes;
@@ -147,7 +147,7 @@ impl Working<17> for Derivatives<'_> {
         self.put_by_bodies(&state, legs, by_bodies, column, pair(&ids, 6), answers);
 
         let by = VariedCoordinates::at(mech, self.set, &self.still, self.given, &state.platform);
-        let determined = by.following.pivots.greater(V::lit(DEPENDENT_PIVOTS));
+        let determined = by.following.pivots.greater(V::lit(SINGULAR));
         let mut sum = V::zero();
         for (k, &number) in self.numbers.iter().enumerate() {
             let varied = by.varied(&self.still, number);
@@ -295,7 +295,7 @@ fn solve<'a, V: Lanes>(
     let (platform, load, codes) = states.loaded_at(mech, loads, at);
     response.set(mech, &platform.pose);
     let motion = response.balance(V::apart(Resultant { mech, platform: &platform, load }), forces);
-    let codes = solved(mech, forces, response.regular, codes);
+    let codes = solved(mech, &platform.pose, forces, response.regular, codes);
     let (load, numbers) = (loads.given(mech, at), RowNumbers::of(mech));
     (SolvedDynamics { platform, load, numbers, forces, motion, response }, codes)
 }

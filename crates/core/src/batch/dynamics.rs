@@ -113,7 +113,7 @@ impl Working<3> for InverseDynamics<'_> {
         for (k, torque) in f[numbers.idle()].iter().enumerate() {
             answers.put(torques, k, [*torque]);
         }
-        within_limits_of(mech, pose, &mut seen, solved(mech, f, regular, codes))
+        within_limits_of(mech, pose, &mut seen, solved(mech, pose, f, regular, codes))
     }
 }
 
@@ -222,7 +222,7 @@ impl Working<9> for Power<'_> {
         let damping = inverse_dynamics::damping_wrench(mech, twist).power(twist);
         let regular = room.solve_motion(mech, &platform, wrench);
         let f = &room.forces;
-        let regular = solved(mech, f, regular, Codes::ok()).are(Status::Ok);
+        let regular = solved(mech, pose, f, regular, Codes::ok()).are(Status::Ok);
         let mut actuators = V::zero();
         for (k, row) in rows::of(mech).take(room.numbers.idle().end).enumerate() {
             actuators = actuators + row.wrench(pose).power(twist) * f[k];

@@ -1,12 +1,10 @@
 //! Forward dynamics of many states.
 
 use super::block::{self, Answers, At, Codes, Pieces, Rows, Working};
-use super::checks::{
-    SINGULAR_PIVOTS, finite, limit_status, pose_at, read_actuated, with_twist, within_limits,
-};
+use super::checks::{finite, limit_status, pose_at, read_actuated, with_twist, within_limits};
 use super::dynamics::Loads;
 use super::{FieldId, Table};
-use crate::dynamics::forward_dynamics::{self, Equations};
+use crate::dynamics::forward_dynamics::{self, Equations, SINGULAR_BALANCE};
 use crate::kinematics::coordinate_sets::Set;
 use crate::kinematics::leg;
 use crate::mobility::singularity_distance::{self, SingularitySearch};
@@ -70,7 +68,7 @@ impl Working<2> for ForwardDynamics<'_> {
             answers.put(multipliers, k, [driven.multipliers[k]]);
         }
         let codes = codes
-            .unless(driven.pivots.greater(V::lit(SINGULAR_PIVOTS)), Status::Singular)
+            .unless(driven.pivots.greater(V::lit(SINGULAR_BALANCE)), Status::Singular)
             .unless(finite(&a), Status::Singular);
         within_limits(mech, &pose, codes)
     }

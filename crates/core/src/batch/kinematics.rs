@@ -231,7 +231,8 @@ impl Working<1> for PlatformTwist<'_> {
         let codes = codes.unless(finite(&room.driven), Status::InvalidInput);
         let found = room.twist(mech, &pose);
         answers.put(field, 0, found.motion.array());
-        solved(mech, &found.motion.array(), found.regular, codes).unless(found.agrees, Status::Inconsistent)
+        solved(mech, &pose, &found.motion.array(), found.regular, codes)
+            .unless(found.agrees, Status::Inconsistent)
     }
 }
 
@@ -270,6 +271,7 @@ impl Working<1> for PlatformAcceleration<'_> {
         let codes = with_twist(mech, &pose, &twist, codes).unless(finite(&room.driven), Status::InvalidInput);
         let found = room.acceleration(mech, &pose, &twist);
         answers.put(field, 0, found.motion.array());
-        solved(mech, &found.motion.array(), found.regular, codes).unless(found.agrees, Status::Inconsistent)
+        solved(mech, &pose, &found.motion.array(), found.regular, codes)
+            .unless(found.agrees, Status::Inconsistent)
     }
 }

@@ -44,7 +44,7 @@ impl Working<4> for Limits<'_> {
         let (platform, load, mut codes) = self.states.loaded_at(mech, self.loads, at);
         if self.forces {
             let regular = room.solve_motion(mech, &platform, load);
-            let determined = solved(mech, &room.forces, regular, Codes::<V>::ok()).are(Status::Ok);
+            let determined = solved(mech, &platform.pose, &room.forces, regular, Codes::ok()).are(Status::Ok);
             for force in &mut room.forces {
                 *force = V::select(determined, *force, V::lit(f64::NAN));
             }

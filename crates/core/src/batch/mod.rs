@@ -12,7 +12,7 @@ mod limits;
 mod reactions;
 mod singularity;
 
-pub use checks::{CONSTRAINT_TOLERANCE, SINGULAR_PIVOTS};
+pub use checks::CONSTRAINT_TOLERANCE;
 pub use coordinates::{Coordinates, coordinate_values, states};
 pub use derivatives::{inverse_dynamics_derivatives, regressors};
 pub use dynamics::{Loads, coupled_forces, inverse_dynamics, power};

@@ -8,10 +8,11 @@
 use crate::dynamics::inverse_dynamics::{damping_wrench, leg_wrench, own_wrench, resultant};
 use crate::kinematics::constraint;
 use crate::kinematics::coordinate_sets::{MAX_COORDINATES, Set, Values};
-use crate::kinematics::dependent_coordinates::{self, DEPENDENT_PIVOTS};
+use crate::kinematics::dependent_coordinates;
 use crate::kinematics::leg;
 use crate::kinematics::quadratic_forms::quadratic;
 use crate::kinematics::rows::Matrix6;
+use crate::kinematics::singular::SINGULAR;
 use crate::model::mechanism::{MAX_CONSTRAINTS, Mechanism};
 use crate::model::status::Status;
 use crate::number::real::{Jet, Ordered, Real};
@@ -24,6 +25,10 @@ const UNKNOWNS: usize = 6 + MAX_CONSTRAINTS;
 
 /// An acceleration as large as those that weight gives, m/s².
 const STANDARD_GRAVITY: f64 = 10.0;
+
+/// Pivot ratio up to which forward dynamics is singular: pivots of its equations go with the square of the
+/// constraints' singular values, G M⁻¹ Gᵀ \[T79\].
+pub const SINGULAR_BALANCE: f64 = SINGULAR * SINGULAR;
 
 /// Largest relative residual of the rates of coordinates fitted to the twist.
 const FOLD_TOLERANCE: f64 = 1e-6;
@@ -234,7 +239,7 @@ pub fn coordinate_equations(
         for (&k, &rate) in free.iter().zip(rates) {
             jets[k].d = rate;
         }
-        dependent_coordinates::state(mech, set, &jets, &mask, branch, pose, DEPENDENT_PIVOTS)
+        dependent_coordinates::state(mech, set, &jets, &mask, branch, pose, SINGULAR)
     };
     let still = state(&[0.0; 6]);
     if still.status != Status::Ok {

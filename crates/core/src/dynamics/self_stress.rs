@@ -9,6 +9,7 @@ use crate::dynamics::joint_reactions::{
 use crate::dynamics::leg_balance::{LegBalance, SolveLeg};
 use crate::dynamics::stress_choice::{Choice, MakeLeast, OPEN, TurnStresses};
 use crate::kinematics::idle;
+use crate::kinematics::singular::WORKING_PRECISION;
 use crate::model::mechanism::Mechanism;
 use crate::number::lanes::Lanes;
 use crate::number::real::{Mask, Real};
@@ -16,10 +17,6 @@ use crate::number::slices::{self, pairs};
 use crate::number::work::work;
 use crate::numerics::householder::Householder;
 use crate::spatial::{Motion, Pose, Vec3, Wrench};
-
-/// Least to greatest singular value of the platform's and the rods' balances below which the pose is
-/// singular.
-const SINGULAR: f64 = 1e-12;
 
 /// Largest residual of the equilibrium equations, relative to the reactions.
 const RESIDUAL: f64 = 1e-9;
@@ -161,7 +158,7 @@ impl<'a, V: Lanes> Solver<'a, V> {
         }
         let holds = self.solve_given(pose);
         let known = V::select(holds, V::one(), V::zero());
-        V::select(regular.greater(V::lit(SINGULAR)), known, V::zero()).greater(V::zero())
+        V::select(regular.greater(V::lit(WORKING_PRECISION)), known, V::zero()).greater(V::zero())
     }
 
     /// Balances what is given.
@@ -301,7 +298,7 @@ impl<'a, V: Lanes> Solver<'a, V> {
         for w in &self.least {
             size = add_square(pure(*w, length), size);
         }
-        let least = if mech.mobility.uncontrolled == 0 { SINGULAR } else { f64::INFINITY };
+        let least = if mech.mobility.uncontrolled == 0 { WORKING_PRECISION } else { f64::INFINITY };
         // Nothing times what is finite is nothing.
         let known = V::select((size * V::zero()).at_most(V::zero()), V::one(), V::zero());
         let balanced = V::select(left.at_most(size.scale(RESIDUAL * RESIDUAL)), known, V::zero());

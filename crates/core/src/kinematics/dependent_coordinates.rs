@@ -3,6 +3,7 @@
 
 use crate::kinematics::constraint;
 use crate::kinematics::coordinate_sets::{MAX_COORDINATES, Plane, Set, Values, motion};
+use crate::kinematics::singular::SINGULAR;
 use crate::model::mechanism::{MAX_CONSTRAINTS, Mechanism};
 use crate::model::status::Status;
 use crate::number::lanes::{Lanes, any};
@@ -10,19 +11,11 @@ use crate::number::real::{Constant, Dual, Jet, Mask, Ordered, Real, Scalar, Trig
 use crate::numerics::gauss::solve;
 use crate::spatial::{Motion, Pose, Vec3};
 
-/// |sin γ| below which the two branches of [Eq. 5] count as one.
-const FOLD: f64 = 1e-6;
-
 /// |cos γ| - 1 that is rounding of one.
 const COSINE_ROUNDING: f64 = 1e-12;
 
 /// Pivot ratio below which the dependent coordinates are not determined to working precision.
 pub const DEPENDENT_PIVOTS: f64 = 1e-9;
-
-/// Pivot ratio below which a state counts as one where they are not determined: well above what rounding makes of
-/// zero. Where constraints depend on one another residuals go with the square of what a pose is off, so that
-/// Newton's method ends about the root of rounding, 1e-8, away from it.
-pub const FOLD_PIVOTS: f64 = 1e-6;
 
 /// Residual, as a pure number, that is rounding of zero.
 const SOLVED: f64 = 1e-12;
@@ -45,8 +38,8 @@ pub struct CoordinateState {
 /// Pose, twist and acceleration from the given coordinates and their rates; dependent ones are solved from
 /// the constraints, starting at those of `guess`.
 ///
-/// `given` marks the entries of `q` that are given. `branch` is the sign of sin γ for [Eq. 5]. `least` is the pivot
-/// ratio up to which a state is a fold.
+/// `given` marks the entries of `q` that are given. `branch` is the sign of sin γ for [Eq. 5], below
+/// [`SINGULAR`] in size at a fold. `least` is the pivot ratio up to which a state of the other sets is one.
 #[must_use]
 #[allow(clippy::too_many_arguments)]
 pub fn state(
@@ -108,7 +101,7 @@ fn tool_turn<V: Ordered>(mech: &Mechanism, q: &Values<Jet<V>>) -> Conditions<V> 
     let cosine = axis.dot(Vec3::lift(mech.home.rotation * mech.tool_axis)) / axis.norm();
     [
         (cosine.at_most(cosine), Status::InvalidInput),
-        (V::lit(FOLD * FOLD).at_most(V::one() + cosine), Status::Fold),
+        (V::lit(SINGULAR * SINGULAR).at_most(V::one() + cosine), Status::Fold),
     ]
 }
 
@@ -117,7 +110,7 @@ fn tool_turn<V: Ordered>(mech: &Mechanism, q: &Values<Jet<V>>) -> Conditions<V> 
 fn branch_of_gamma<V: Ordered>(plane: &Plane, q: &mut Values<Jet<V>>, branch: f64) -> Conditions<V> {
     let cosine = plane.cosine(Vec3::new(q[0], q[1], q[2]), q[3]);
     let exists = cosine.x.abs().at_most(V::lit(1.0 + COSINE_ROUNDING));
-    let regular = V::lit(FOLD * FOLD).at_most(V::one() - cosine.x * cosine.x);
+    let regular = V::lit(SINGULAR * SINGULAR).at_most(V::one() - cosine.x * cosine.x);
     let inside = cosine.x.most(V::lit(-1.0)).least(V::one());
     let gamma =
         Jet::new(inside, cosine.d, cosine.dd).acos().scale(branch.signum()) - Jet::lit(plane.lever().1);
@@ -159,8 +152,8 @@ impl Dependent {
 
 /// Newton on the independent constraints for the coordinates that are not given, from those of `start`, then
 /// their rates and second rates from the same matrix: `G_y y' = -ġ(y' = 0)`, `G_y y'' = -g̈(y'' = 0)`
-/// \[T23\]. Only where they are `wanted`, and regular above `least`; every lane goes its own way to its own end. Returns the sign of det
-/// G_y too: it tells apart the solutions that meet in a fold.
+/// \[T23\]. Only where they are `wanted`, and regular above `least`; every lane goes its own way to its own
+/// end. Returns the sign of det G_y too: it tells apart the solutions that meet in a fold.
 #[inline(always)]
 pub fn solve_dependent<V: Lanes>(
     mech: &Mechanism,

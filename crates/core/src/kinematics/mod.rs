@@ -12,3 +12,4 @@ pub mod passive_joints;
 pub mod quadratic_forms;
 pub mod redundant_rows;
 pub mod rows;
+pub mod singular;

@@ -6,6 +6,7 @@ use nalgebra::{DMatrix, DVector};
 use crate::kinematics::idle;
 use crate::kinematics::leg;
 use crate::kinematics::rows::{constraint_row, gram, pure_jacobian, pure_rows};
+use crate::kinematics::singular::SINGULAR;
 use crate::model::mechanism::{Constraint, Leg, Mechanism};
 use crate::number::order::larger;
 use crate::number::real::{Dual, Ordered};
@@ -13,10 +14,6 @@ use crate::numerics::gauss;
 use crate::numerics::svd::Svd;
 use crate::spatial::motion::pure_row;
 use crate::spatial::{Pose, Twist, Vec3};
-
-/// A singular value, a row's size, a leg's length or its sine (all pure numbers) counts as zero up to this
-/// much: poses may miss their constraints by as much of the characteristic length.
-pub const TOLERANCE: f64 = 1e-6;
 
 /// Kind of a singularity, by the conditions of \[T32\]: the first that holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -225,7 +222,7 @@ fn without_idle(mech: &Mechanism, pose: &Pose<f64>, scale: f64, basis: DMatrix<f
 fn leg_values(mech: &Mechanism, pose: &Pose<f64>, scale: f64, allowed: &Allowed) -> (Vec<f64>, Twist<f64>) {
     let freedoms = allowed.basis.nrows();
     let has_row = |(leg, p): &(&Leg, leg::Position<f64>)| {
-        p.length > TOLERANCE * scale && leg::transmission(leg, p).abs() > TOLERANCE
+        p.length > SINGULAR * scale && leg::transmission(leg, p).abs() > SINGULAR
     };
     let legs: Vec<_> = mech.actuated().map(|(_, leg)| (leg, leg::position(leg, pose))).collect();
     let nothing = (vec![f64::NAN; freedoms], Twist::from_array([f64::NAN; 6]));
@@ -247,7 +244,7 @@ fn leg_values(mech: &Mechanism, pose: &Pose<f64>, scale: f64, allowed: &Allowed)
 /// The singular values at a pose \[T24\]; NaN where an actuated leg has no direction.
 #[must_use]
 pub fn conditioning(mech: &Mechanism, pose: &Pose<f64>, scale: f64) -> Conditioning {
-    values_of(&leg_values(mech, pose, scale, &allowed(mech, pose, scale, TOLERANCE)).0)
+    values_of(&leg_values(mech, pose, scale, &allowed(mech, pose, scale, SINGULAR)).0)
 }
 
 fn values_of(sigma: &[f64]) -> Conditioning {
@@ -274,9 +271,9 @@ pub fn singularity(mech: &Mechanism, pose: &Pose<f64>, scale: f64, tolerance: f6
     let first_zero = |values: &[f64], limit: f64| values.iter().position(|&x| x <= limit);
     let row_size = |c: &Constraint| constraint_row(c, pose, scale).iter().map(|e| e * e).sum::<f64>().sqrt();
     let vanishing = mech.constraints.iter().find(|c| row_size(c) <= tolerance);
-    let (kind, leg) = if let Some(leg) = first_zero(&leg_length, larger(tolerance, TOLERANCE)) {
+    let (kind, leg) = if let Some(leg) = first_zero(&leg_length, larger(tolerance, SINGULAR)) {
         (Kind::LegLength, Some(leg))
-    } else if let Some(leg) = first_zero(&across, larger(tolerance, TOLERANCE)) {
+    } else if let Some(leg) = first_zero(&across, larger(tolerance, SINGULAR)) {
         (Kind::StrutAcrossRail, Some(leg))
     } else if let (true, Some(c)) = (allowed.lost, vanishing) {
         (Kind::ConstraintVanishes, Some(c.leg))
@@ -317,7 +314,7 @@ fn smallest_of_chosen(mech: &Mechanism, pose: &Pose<f64>, scale: f64) -> f64 {
 pub fn screw(o: Vec3<f64>, twist: &Twist<f64>, scale: f64) -> Screw {
     let Twist { v, omega } = *twist;
     let square = omega.dot(omega);
-    if scale * omega.norm() <= TOLERANCE * v.norm() {
+    if scale * omega.norm() <= SINGULAR * v.norm() {
         return Screw { axis: v.unit(), pitch: f64::INFINITY, point: o };
     }
     Screw { axis: omega.unit(), pitch: v.dot(omega) / square, point: o + omega.cross(v) * (1.0 / square) }

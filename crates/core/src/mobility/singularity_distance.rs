@@ -6,7 +6,8 @@ use std::f64::consts::PI;
 
 use crate::kinematics::coordinate_sets::{MAX_COORDINATES, Set, Values};
 use crate::kinematics::dependent_coordinates::{self, CoordinateState, DEPENDENT_PIVOTS};
-use crate::mobility::singularity::{self, Kind, TOLERANCE};
+use crate::kinematics::singular::SINGULAR;
+use crate::mobility::singularity::{self, Kind};
 use crate::model::mechanism::Mechanism;
 use crate::model::status::Status;
 use crate::number::order::{larger, largest};
@@ -164,7 +165,7 @@ impl CoordinatePath<'_> {
     /// The kind where det J is zero. Where a constraint is lost the dependent coordinates are not determined:
     /// a pose shortly before tells it then.
     fn kind_at_zero(&self, way: f64, step: f64) -> Option<Kind> {
-        let here = self.pose(way).and_then(|pose| self.kind(&pose, TOLERANCE));
+        let here = self.pose(way).and_then(|pose| self.kind(&pose, SINGULAR));
         here.or_else(|| {
             let before =
                 SHORTLY_BEFORE.into_iter().find_map(|share| self.pose(larger(way - share * step, 0.0)));
@@ -188,7 +189,7 @@ pub fn along(
     let path = CoordinatePath { mech, search, given, start: *start, branch, index, direction, last };
     let side = path.state(0.0).branch;
     let touches = |way: f64| {
-        path.pose(way).is_some_and(|pose| singularity::smallest(mech, &pose, search.scale) <= TOLERANCE)
+        path.pose(way).is_some_and(|pose| singularity::smallest(mech, &pose, search.scale) <= SINGULAR)
     };
     let (step, reach) = search.extent(index);
     let found = hermite_roots::first_zero(|way| path.node(way, side), touches, step, reach);

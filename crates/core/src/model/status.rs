@@ -12,7 +12,7 @@ pub enum Status {
     Fold = 2,
     /// The iteration for the dependent coordinates did not converge.
     NotConverged = 3,
-    /// The Jacobian is singular to working precision, or a leg has no frame.
+    /// The Jacobian is singular, or a leg has no frame.
     Singular = 4,
     /// A leg is longer or shorter than its stroke allows; the numbers stand.
     OutOfStroke = 5,
@@ -84,8 +84,8 @@ impl Status {
                 "no pose was found from the guess; give a guess nearer to the pose or check that it exists"
             }
             Status::Singular => {
-                "singular to working precision: a leg has no length or lies along the axis of its joint, or \
-                 the Jacobian does not determine forces and velocities at this pose"
+                "singular: a leg has no length or lies along the axis of its joint, or the Jacobian does not \
+                 determine forces and velocities at this pose"
             }
             Status::OutOfStroke => {
                 "a leg is outside its stroke; the numbers stand, the machine cannot reach the pose"
