@@ -16,7 +16,7 @@ from polypod.answers.singularity_kind import SingularityKind as SingularityKind
 Kinds = NDArray[np.int8]
 
 TOLERANCE = _core.SINGULAR
-"""A measure of nearness (a pure number) up to which a pose is singular: poses are as exact as that [T79]."""
+"""A measure of nearness (a pure number) up to which a pose is singular: poses are as exact as that [T77]."""
 
 NEAR_SINGULAR = 0.01
 """Smallest singular value (a pure number) below which a pose is called nearly singular."""

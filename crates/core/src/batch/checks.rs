@@ -256,7 +256,7 @@ pub(super) fn joint_limits(mech: &Mechanism) -> impl Iterator<Item = &Limit> {
 }
 
 /// Whether a system at a pose was solved: the mechanism is controlled, no constraint is lost, the pivots tell
-/// a regular matrix, all is finite \[T79\].
+/// a regular matrix, all is finite \[T77\].
 #[inline(always)]
 pub(super) fn solved<V: Lanes>(
     mech: &Mechanism,

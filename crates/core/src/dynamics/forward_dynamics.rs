@@ -27,7 +27,7 @@ const UNKNOWNS: usize = 6 + MAX_CONSTRAINTS;
 const STANDARD_GRAVITY: f64 = 10.0;
 
 /// Pivot ratio up to which forward dynamics is singular: pivots of its equations go with the square of the
-/// constraints' singular values, G M⁻¹ Gᵀ \[T79\].
+/// constraints' singular values, G M⁻¹ Gᵀ \[T77\].
 pub const SINGULAR_BALANCE: f64 = SINGULAR * SINGULAR;
 
 /// Largest relative residual of the rates of coordinates fitted to the twist.

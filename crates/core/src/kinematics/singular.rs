@@ -1,4 +1,4 @@
-//! What counts as singular: one margin for all judgements \[T79\].
+//! What counts as singular: one margin for all judgements \[T77\].
 
 use crate::kinematics::rows::constraint_row;
 use crate::model::mechanism::{MAX_CONSTRAINTS, Mechanism};
