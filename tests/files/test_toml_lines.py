@@ -142,3 +142,11 @@ def test_single_brackets_of_a_list_are_one_fault(tmp_path, text: str, expected: 
     with pytest.raises(MechanismError) as caught:
         pp.load(file)
     assert [str(fault) for fault in caught.value.faults] == [expected]
+
+
+def test_one_table_in_place_of_an_array_has_lines_of_its_own():
+    text = '[units]\nlength = "mm"\n[legs]\nangle = 3\nbase.joint = "U"\n[[rods]]\nname = "L"\n'
+    assert line_of(text, "legs.1.angle") == 4
+    assert line_of(text, "legs.1.base.joint") == 5
+    assert line_of(text, "legs.1.stroke") == 3
+    assert line_of(text, "rods.1.name") == 7

@@ -518,3 +518,5 @@ def places(value: Any, place: str = "", path: tuple[Any, ...] = ()) -> Iterator[
         at = f"{place}.{word}" if place else word
         yield at, (*path, key)
         yield from places(entry, at, (*path, key))
+        if not place and key in ("legs", "rods") and isinstance(entry, dict):
+            yield from places([entry], at, (*path, key))  # one table in place of a list is its first

@@ -59,6 +59,8 @@ def line_of(text: str, place: str) -> int | None:
     """
     lines = _lines(text)
     path = _parts(place)
+    if path[1:2] == ("1",) and path[:2] not in lines:
+        path = path[:1] + path[2:]  # one table in place of an array of them
     for length in range(len(path), 0, -1):
         if path[:length] in lines:
             return lines[path[:length]]
