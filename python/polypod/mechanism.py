@@ -312,14 +312,8 @@ class Mechanism:
                 f"redundant actuators: {driven} for {self.dof - len(mobility.idle)} degrees of freedom. "
                 "Their forces are a choice, and only lengths that agree have a pose."
             )
-            held = [
-                leg for leg, letters in zip(self.leg_names, self.leg_letters, strict=True) if letters == "UPU"
-            ]
-            if held:
-                notes[-1] += (
-                    f" Legs with U joints at both ends ({', '.join(held)}) do not rotate about their own "
-                    "lines; where they should, they have a spherical joint at one end: UPS or SPU."
-                )
+            if held := self._core.about_universal_legs():
+                notes[-1] += f" {held}."
         notes += implausible_bodies(self.geometry, float(np.max(spans(self))))
         notes += [f"local degree of freedom: {idle}; nothing drives or holds it." for idle in mobility.idle]
         if mobility.passive:

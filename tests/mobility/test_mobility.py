@@ -48,3 +48,12 @@ def test_legs_with_universal_joints_at_both_ends_are_explained():
     with pytest.raises(MechanismError) as caught:
         pp.Mechanism.from_dict(_six_upu(parallel=False))
     assert any("has a spherical joint at one end, UPS or SPU" in str(f) for f in caught.value.faults)
+
+
+def test_slider_legs_with_universal_joints_at_both_ends_are_explained_by_their_own_letters():
+    data = pp.load("3-puu").to_dict()
+    data["legs"][0]["platform"]["axis"] = [0.3, 0.4, 0.5]
+    with pytest.raises(MechanismError) as caught:
+        pp.Mechanism.from_dict(data)
+    (told,) = {str(f) for f in caught.value.faults if "(PUU)" in str(f)}
+    assert "has a spherical joint at one end, PUS or PSU" in told

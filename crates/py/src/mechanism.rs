@@ -122,6 +122,11 @@ impl PyMechanism {
         self.0.legs.iter().map(polypod_core::model::mechanism::Leg::letters).collect()
     }
 
+    /// What is said of legs with U joints at both ends, if there are any.
+    fn about_universal_legs(&self) -> Option<String> {
+        polypod_core::assembly::universal_legs::about(&self.0)
+    }
+
     /// Name, all numbers, and whether each must be given (none for a set where any will do).
     fn coordinate_sets(&self) -> Vec<CoordinateSet> {
         Set::of(&self.0).iter().map(|s| (s.name(), s.names().to_vec(), s.given(&self.0))).collect()

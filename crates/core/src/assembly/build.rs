@@ -2,6 +2,7 @@
 //! parts that could be read, and every fault is reported at once.
 
 use crate::assembly::drives;
+use crate::assembly::universal_legs;
 use crate::kinematics::constraint;
 use crate::kinematics::leg;
 use crate::limits::margins;
@@ -117,17 +118,18 @@ fn check_home(mech: &Mechanism) -> Vec<Fault> {
 fn check_freedoms(mech: &Mechanism) -> Option<Fault> {
     let (actuators, dof) = (mech.actuated().count(), mech.dof());
     let Mobility { joint_freedoms, closure_rank, passive, .. } = mech.mobility;
+    let held = universal_legs::about(mech).map_or_else(String::new, |about| format!(". {about}"));
     if joint_freedoms != closure_rank + dof + passive {
         let message = format!(
             "its constraints leave {dof} degrees of freedom, but its loop closures {joint_freedoms} - \
-             {closure_rank} - {passive}; this combination of joints is not modelled"
+             {closure_rank} - {passive}; this combination of joints is not modelled{held}"
         );
         return Some(Fault::new("mechanism", message));
     }
     let idle = mech.idle.len();
     if dof == 0 {
         let message = "together they leave the platform no degree of freedom; release a joint";
-        return Some(Fault::new("legs", format!("{message}{}", about_universal_joints(mech))));
+        return Some(Fault::new("legs", format!("{message}{held}")));
     }
     if idle == dof {
         let all = if dof == 1 {
@@ -149,23 +151,6 @@ fn check_freedoms(mech: &Mechanism) -> Option<Fault> {
          actuated"
     );
     (actuators < needed).then(|| Fault::new("legs", message))
-}
-
-/// What a leg with U joints at both ends should often be.
-const FREE_LEG: &str = "a leg that should rotate freely has a spherical joint at one end, UPS or SPU";
-
-/// That legs with U joints at both ends do not spin, and which ones would.
-fn about_universal_joints(mech: &Mechanism) -> String {
-    let both = |leg: &&Leg| [leg.base_kind(), leg.platform.kind] == [JointKind::Universal; 2];
-    let names: Vec<&str> = mech.legs.iter().filter(both).map(|leg| &leg.name[..]).collect();
-    if names.is_empty() {
-        return String::new();
-    }
-    format!(
-        ". A leg with U joints at both ends (here {}) does not rotate about its own line, which takes a degree \
-         of freedom from the platform; {FREE_LEG}",
-        names.join(", ")
-    )
 }
 
 /// Faults in the relations between parts.
@@ -307,8 +292,7 @@ fn home_message(mech: &Mechanism, c: &Constraint, missed: f64) -> String {
         ConstraintKind::D => "its axis in the base must be perpendicular to its axis in the platform",
         ConstraintKind::E => "legs on one rod must keep the angle between their planes",
     };
-    let both_universal = [leg.base_kind(), leg.platform.kind] == [JointKind::Universal; 2];
-    let instead = if both_universal { format!("; {FREE_LEG}") } else { String::new() };
+    let instead = universal_legs::instead(leg).map_or_else(String::new, |instead| format!("; {instead}"));
     let off = match c.kind {
         ConstraintKind::D => {
             format!(
