@@ -270,8 +270,9 @@ class Mechanism:
 
     @property
     def warnings(self) -> list[str]:
-        """Warnings for the user of this mechanism, in plain words."""
+        """Warnings for the user of this mechanism, in plain words and the units of its description."""
         from polypod.files.body_plausibility import implausible_bodies
+        from polypod.files.units import in_units
 
         mobility, notes = self.mobility(), []
         sigma = self.conditioning(self.home)
@@ -321,7 +322,7 @@ class Mechanism:
                 f"legs {', '.join(mobility.passive_legs)} spin freely about their own line "
                 f"({mobility.passive} passive degrees of freedom)."
             )
-        return notes
+        return [in_units(note, self._data["units"]) for note in notes]
 
     @property
     def _gained_at_home(self) -> int:

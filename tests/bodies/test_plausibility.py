@@ -33,7 +33,7 @@ def test_built_in_machines_are_plausible(name: str):
         (
             ("platform", "inertia"),
             [5e4] * 3,
-            "radii of gyration are far larger than the machine: platform (1.29e+05 mm)",
+            "radii of gyration are far larger than the machine: platform (129000 mm)",
         ),
         (
             ("units", "inertia"),
@@ -48,6 +48,13 @@ def test_other_units_than_meant_are_told(place: tuple[str, str], value: object, 
     (warning,) = doubts(pp.Mechanism.from_dict(data))
     assert expected in warning
     assert "the longest leg has 754.4 mm at the centre pose" in warning
+
+
+def test_they_are_told_in_units_of_the_file():
+    data = pp.load(NAME).to_dict()
+    data["units"]["mass"], data["platform"]["mass"] = "lb", 1e4
+    (warning,) = doubts(pp.Mechanism.from_dict(data))
+    assert "like the longest leg: platform (10000 lb); the longest leg has 754.4 mm" in warning
 
 
 def test_a_mass_next_to_zero_is_told_without_overflow(recwarn: pytest.WarningsRecorder):

@@ -234,6 +234,11 @@ def test_home_off_the_constraints_names_legs_and_a_pose_nearby() -> None:
         ),
         ({"length": "mm"}, 'leg "5 m" is 5 m', 'leg "5 m" is 5000 mm'),
         ({"length": "mm", "mass": "g"}, "1 kg, 2 kg m^2, 3 m/s, 4 N m", "1000 g, 2 kg m^2, 3 m/s, 4 N m"),
+        (
+            {"length": "mm"},
+            "through (0, 0.5, -0.12) m along (0, 0, 1)",
+            "through (0, 500, -120) mm along (0, 0, 1)",
+        ),
         ({"length": "ell"}, "is 5 m", "is 5 m"),
         (["length"], "is 5 m", "is 5 m"),
     ],

@@ -14,7 +14,7 @@ LARGEST, LEAST = 5.0, 3e-3
 
 
 def implausible_bodies(geometry: dict[str, Any], longest: float) -> list[str]:
-    """A sentence for each kind of doubt about the bodies of a mechanism; `longest`: its longest leg, m."""
+    """A sentence, in SI, for each kind of doubt about the bodies of a mechanism; `longest` is its longest leg."""
     heavy, wide, narrow = [], [], []
     for name, body in bodies_of(geometry).items():
         mass, inertia = body["mass"], np.array(body["inertia"])
@@ -23,10 +23,10 @@ def implausible_bodies(geometry: dict[str, Any], longest: float) -> list[str]:
         if mass > 0.0 and inertia.any():
             # Roots first: a mass next to zero leaves no finite square.
             radius = math.sqrt(max(float(np.linalg.eigvalsh(inertia)[-1]), 0.0)) / math.sqrt(mass)
-            shown = f"{name} ({1e3 * radius:.3g} mm)"
+            shown = f"{name} ({radius:.3g} m)"
             wide += [shown] if radius > LARGEST * longest else []
             narrow += [shown] if radius < LEAST * longest else []
-    leg = f"the longest leg has {1e3 * longest:.4g} mm at the centre pose"
+    leg = f"the longest leg has {longest:.4g} m at the centre pose"
     found = []
     if heavy:
         found.append(f"heavier than a cube of steel with edges like the longest leg: {_few(heavy)}; {leg}.")

@@ -114,7 +114,7 @@ def in_units(text: str, units: object) -> str:
         unit = table.get(kind)
         if not isinstance(unit, str) or unit not in UNITS[kind]:
             continue
-        quantity = re.compile(rf"(\[[^\]]*\]|{_NUMBER}) {si_unit(kind)}(?![\w/^]| m\^)")
+        quantity = re.compile(rf"(\[[^\]]*\]|\([^()]*\)|{_NUMBER}) {si_unit(kind)}(?![\w/^]| m\^)")
 
         def converted(found: re.Match[str], kind: str = kind, unit: str = unit) -> str:
             return re.sub(_NUMBER, lambda one: _rewritten(one[0], kind, unit), found[1]) + f" {unit}"
