@@ -14,7 +14,7 @@ LARGEST, LEAST = 5.0, 3e-3
 
 
 def implausible_bodies(geometry: dict[str, Any], longest: float) -> list[str]:
-    """A sentence, in SI, for each kind of doubt about the bodies of a mechanism; `longest` is its longest leg."""
+    """A sentence for each kind of doubt about the bodies of a mechanism, in SI; `longest` leg in m."""
     heavy, wide, narrow = [], [], []
     for name, body in bodies_of(geometry).items():
         mass, inertia = body["mass"], np.array(body["inertia"])
