@@ -20,7 +20,8 @@ from skimage.measure import marching_cubes
 
 import polypod as pp
 from polypod.bodies.palette import BLUE, GREY, INK, PALE, SKY, VERMILION, color_of
-from polypod.plots import plot_fig4, plot_mechanism, plot_poses, plot_topology, plot_workspace
+from polypod.paper.fig1 import fig1_poses
+from polypod.plots import plot_fig1, plot_fig4, plot_mechanism, plot_poses, plot_topology, plot_workspace
 from polypod.plots.style import dash_of, house_style
 
 Array = NDArray[np.float64]
@@ -70,6 +71,16 @@ def published() -> Figure:
 
 
 # --8<-- [end:published]
+
+
+@picture
+# --8<-- [start:fig1]
+def fig1() -> Figure:
+    mech = pp.load("lu-3spu-2rpu-r")
+    return plot_fig1(mech, fig1_poses(mech), Figure(figsize=(10.0, 8.2)))
+
+
+# --8<-- [end:fig1]
 
 
 @picture
@@ -386,10 +397,11 @@ def sweep() -> Figure:
 
 
 def save(figure: Figure, path: Path) -> None:
-    """Writes a small PNG file, without transparency."""
+    """Writes a small PNG file: of 256 colours, without transparency."""
     with house_style():
         figure.savefig(buffer := io.BytesIO(), dpi=DOTS)
-    Image.open(buffer).convert("RGB").save(path, optimize=True)
+    colors = Image.open(buffer).convert("RGB").quantize(dither=Image.Dither.NONE)
+    colors.save(path, optimize=True)
 
 
 def main() -> None:

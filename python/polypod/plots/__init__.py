@@ -4,6 +4,7 @@ Each function draws on the axes or figure that it is given, or makes them with p
 """
 
 from polypod.plots.canvas import save_figure
+from polypod.plots.fig1 import plot_fig1
 from polypod.plots.fig4 import fig4_panels, plot_fig4
 from polypod.plots.mechanism import plot_mechanism, plot_poses
 from polypod.plots.series import plot_series
@@ -12,6 +13,7 @@ from polypod.plots.workspace import plot_workspace, plot_workspace_view
 
 __all__ = [
     "fig4_panels",
+    "plot_fig1",
     "plot_fig4",
     "plot_mechanism",
     "plot_poses",

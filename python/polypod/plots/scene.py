@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
 from typing import Any, NamedTuple
 
+import matplotlib as mpl
 import numpy as np
 from matplotlib.colors import to_rgb
 from matplotlib.lines import Line2D
@@ -24,6 +24,7 @@ from polypod.bodies.solids import four_sided, tube
 from polypod.legs.joints import JOINTS
 from polypod.mechanism import Mechanism
 from polypod.plots.canvas import size_of
+from polypod.plots.labels import Name, spread
 from polypod.vectors import unit
 
 Array = NDArray[np.float64]
@@ -34,22 +35,28 @@ LIGHT = np.array([-0.35, -0.55, 0.76])
 _HALO = [withStroke(linewidth=2.2, foreground="white", alpha=0.85)]
 
 
-class _JointLabel(NamedTuple):
-    at: Array
-    away: Array
-    """From the middle of the plate."""
-    leg_side: int
-    """+1 where the leg is above the joint, -1 where it is below."""
-    distance: float
-    text: str
+class Label(NamedTuple):
+    """A name in the picture, m, base axes."""
 
-    def place(self, right: Array, up: Array) -> Array:
-        """Outwards as seen, but not on the leg, which is above or below."""
-        x, y = float(self.away @ right), float(self.away @ up)
-        if y * self.leg_side > 0.0:
-            x, y = math.copysign(1.0, x), 0.0
-        size = math.hypot(x, y) or 1.0
-        return self.at + self.distance * (x * right + y * up) / size
+    text: str
+    point: Array
+    """(3,): what it names."""
+    wanted: Array
+    """(3,): where it should stand."""
+
+
+def joint_label(text: str, point: Array, away: Array, leg_side: int, distance: float) -> Label:
+    """The name of a joint: outwards as seen, but not on the leg, which is above or below.
+
+    `away` is from the middle of the plate; `leg_side` is +1 where the leg is above the joint, -1 where it is
+    below.
+    """
+    right, up = right_and_up()
+    x, y = float(away @ right), float(away @ up)
+    if y * leg_side > 0.0:
+        x, y = math.copysign(1.0, x), 0.0
+    size = math.hypot(x, y) or 1.0
+    return Label(text, point, point + distance * (x * right + y * up) / size)
 
 
 class Faces:
@@ -97,10 +104,9 @@ class Scene:
         self.faces = Faces()
         self.overlay = Faces()
         """Lines and labels drawn over the bodies even where they hide them."""
-        self.labels: list[tuple[Array, str]] = []
-        self.joint_labels: list[_JointLabel] = []
-        sides = [leg[side]["joint"] for leg in spec["legs"] for side in ("base", "platform")]
-        self.kinds = dict.fromkeys(sides)  # joint kinds in use, in order
+        self.labels: list[Label] = []
+        self.lines: list[tuple[Array, Array]] = []
+        """Ends of what names should not cover, m."""
         self._size, thick = mech.characteristic_length, max(leg_radii(mech))
         self._add_links(mech, links_of(mech), link_frames(mech, pose).frames)
         vectors = mech.inverse_kinematics(pose).vectors
@@ -112,7 +118,8 @@ class Scene:
             for letter, points, leg_side in ((below, base, 1), ("b", platform, -1)):
                 text = f"${letter}_{{{math_name(name)}}}$"
                 away = points[i] - points.mean(axis=0)
-                self.joint_labels.append(_JointLabel(points[i], away, leg_side, 5.2 * thick, text))
+                self.labels.append(joint_label(text, points[i], away, leg_side, 5.2 * thick))
+            self.lines.append((base[i], platform[i]))
         for i, rod in enumerate(spec["rods"]):
             on = [j for j, leg in enumerate(spec["legs"]) if leg["base"]["rod"] == i]
             self._rod_label(rod, base[on], thick)
@@ -122,12 +129,7 @@ class Scene:
     def corners(self) -> Array:
         """(n, 3): two corners of each face, and the labels, m."""
         bodies = [faces.corners()[:, ::2].reshape(-1, 3) for faces in (self.faces, self.overlay)]
-        return np.concatenate([*bodies, [at for at, _ in self.placed_labels()]])
-
-    def placed_labels(self) -> list[tuple[Array, str]]:
-        """All labels and where they go in the house view."""
-        right, up = _right_and_up()
-        return [*self.labels, *((label.place(right, up), label.text) for label in self.joint_labels)]
+        return np.concatenate([*bodies, [label.wanted for label in self.labels]])
 
     def _add_links(self, mech: Mechanism, links: tuple[Link, ...], frames: Array) -> None:
         """All links; but nothing inside a barrel or a carriage: faces sorted by depth would not hide it."""
@@ -149,7 +151,9 @@ class Scene:
         axis, start = unit(rod["axis"]), np.array(rod["point"])
         along = (points - start) @ axis
         side = start + (0.7 * along.min() + 0.3 * along.max()) * axis
-        self.labels.append((side + np.array([0.0, 0.0, 2.2 * thick]), f"${math_name(rod['name'])}$"))
+        above = np.array([0.0, 0.0, 2.2 * thick])
+        self.labels.append(Label(f"${math_name(rod['name'])}$", side, side + above))
+        self.lines.append((start + along.min() * axis, start + along.max() * axis))
 
     def _triad(self, faces: Faces, pose: Array, origin: str, names: str) -> None:
         size = 0.66 * self._size
@@ -158,15 +162,16 @@ class Scene:
             tip, neck = (start + part * size * pose[:3, column] for part in (1.0, 0.78))
             faces.add(tube(start, neck, 0.018 * self._size, sides=10), INK)
             faces.add(tube(neck, tip, 0.055 * self._size, end_radius=0.0), INK)
-            self.labels.append((start + 1.17 * (tip - start), f"${name}$"))
-        self.labels.append((start - 0.16 * size * pose[:3, :3].sum(axis=1), f"${origin}$"))
+            self.labels.append(Label(f"${name}$", tip, start + 1.17 * (tip - start)))
+            self.lines.append((start, tip))
+        self.labels.append(Label(f"${origin}$", start, start - 0.16 * size * pose[:3, :3].sum(axis=1)))
 
 
 def draw(ax: Axes3D, scene: Scene, half: Array, zoom: float, labels: bool) -> None:
     """A scene, centred in its axes, at a scale that `half` and `zoom` set (see `frame`)."""
     ax.computed_zorder = False
     for part, zorder in ((scene.faces, 1.0), (scene.overlay, 2.0)):
-        corners, shades = part.seen(np.cross(*_right_and_up()))
+        corners, shades = part.seen(np.cross(*right_and_up()))
         # Edges of the same colour close the seams; as a picture inside the SVG the many faces stay small.
         faces = Poly3DCollection(
             corners, facecolors=shades, edgecolors=shades, linewidths=0.25, rasterized=True
@@ -176,8 +181,21 @@ def draw(ax: Axes3D, scene: Scene, half: Array, zoom: float, labels: bool) -> No
     frame(ax, scene.corners(), half, zoom)
     ax.set_axis_off()
     if labels:
-        for at, text in scene.placed_labels():
-            ax.text(*at, text, ha="center", va="center", fontsize=8, path_effects=_HALO, zorder=10)
+        write(ax, scene.labels, scene.lines)
+
+
+def write(ax: Axes3D, labels: list[Label], lines: list[tuple[Array, Array]], color: str = INK) -> None:
+    """Names in framed axes, each near its wanted place, where they cover neither one another nor lines."""
+    names = [Name(label.text, *_on_paper(ax, np.array([label.point, label.wanted]))) for label in labels]
+    seen = _on_paper(ax, np.array(lines).reshape(-1, 3)).reshape(-1, 2, 2)
+    size, (right, up) = float(mpl.rcParams["font.size"]), right_and_up()
+    for label, name, place in zip(labels, names, spread(names, seen, size), strict=True):
+        # From the paper back into space, in the plane through the wanted place that faces the viewer.
+        step = 1e-3 * float(np.ptp(ax.get_zlim()))
+        moved_by = _on_paper(ax, label.wanted + step * np.array([right, up])) - name.wanted
+        across, along = np.linalg.solve(moved_by.T, place - name.wanted) * step
+        at = label.wanted + across * right + along * up
+        ax.text(*at, label.text, ha="center", va="center", color=color, path_effects=_HALO, zorder=10)
 
 
 def frame(ax: Axes3D, corners: Array, half: Array, zoom: float | None = None) -> float:
@@ -186,7 +204,7 @@ def frame(ax: Axes3D, corners: Array, half: Array, zoom: float | None = None) ->
     The limits span `half` to each side of the centre; with `zoom` that is the scale. Without it the corners
     fill the axes. Returns the zoom.
     """
-    right, up = _right_and_up()
+    right, up = right_and_up()
     ax.set_proj_type("persp", focal_length=1.6)
     ax.view_init(elev=_ELEVATION, azim=_AZIMUTH)
     center, scale = (corners.min(axis=0) + corners.max(axis=0)) / 2, zoom or 1.0
@@ -207,7 +225,7 @@ def frame(ax: Axes3D, corners: Array, half: Array, zoom: float | None = None) ->
     return scale
 
 
-def _right_and_up() -> tuple[Array, Array]:
+def right_and_up() -> tuple[Array, Array]:
     """Directions in the picture, base axes."""
     (se, ce), (sa, ca) = ((math.sin(a), math.cos(a)) for a in map(math.radians, (_ELEVATION, _AZIMUTH)))
     return np.array([-sa, ca, 0.0]), np.array([-se * ca, -se * sa, ce])
@@ -217,6 +235,13 @@ _ELEVATION, _AZIMUTH = 19.0, -62.0
 _FILL = 0.86
 
 
+def _on_paper(ax: Axes3D, points: Array) -> Array:
+    """(n, 2): points in points of the picture."""
+    ax.apply_aspect()
+    seen: Array = ax.transData.transform(_seen(ax, points)) * 72.0 / ax.get_figure(root=True).dpi
+    return seen
+
+
 def _seen(ax: Axes3D, points: Array) -> Array:
     """(n, 2): points as the axes project them."""
     flat = np.hstack([points, np.ones((len(points), 1))]) @ ax.get_proj().T
@@ -224,8 +249,9 @@ def _seen(ax: Axes3D, points: Array) -> Array:
     return seen
 
 
-def joint_handles(kinds: Iterable[str]) -> list[Line2D]:
-    """The legend of joints."""
+def joint_handles(mech: Mechanism) -> list[Line2D]:
+    """The legend of the joints that a mechanism's legs have at their ends."""
+    kinds = {leg[side]["joint"] for leg in mech.geometry["legs"] for side in ("base", "platform")}
     return [
         Line2D(
             [],
@@ -238,7 +264,7 @@ def joint_handles(kinds: Iterable[str]) -> list[Line2D]:
         )
         for letter, kind in JOINTS.items()
         for marker, size in (kind.marker,)
-        if letter in set(kinds)
+        if letter in kinds
     ]
 
 
