@@ -222,6 +222,17 @@ def workspace() -> Figure:
 
 
 @picture
+# --8<-- [start:fig3-cut]
+def fig3_cut() -> Figure:
+    found = pp.workspace(pp.load("lu-3spu-2rpu-r"), step=0.02)
+    highest = found.extents[2, 1]
+    return plot_workspace(found, Figure(figsize=(8.0, 6.6)), above=highest - 0.511)  # m, as printed
+
+
+# --8<-- [end:fig3-cut]
+
+
+@picture
 # --8<-- [start:slice-of-positions]
 def slice_of_positions() -> Figure:
     mech = pp.load("lu-3spu-2rpu-r")

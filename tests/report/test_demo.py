@@ -27,6 +27,8 @@ def test_all_files_are_there(demo):
             "fig1.svg",
             "fig3.png",
             "fig3.svg",
+            "fig3-cut.png",
+            "fig3-cut.svg",
             "fig4.png",
             "fig4.svg",
         ),
@@ -34,7 +36,7 @@ def test_all_files_are_there(demo):
     }
 
 
-@pytest.mark.parametrize("name", ["fig1", "fig3", "fig4"])
+@pytest.mark.parametrize("name", ["fig1", "fig3", "fig3-cut", "fig4"])
 def test_figures_show_something(demo, name):
     picture = matplotlib.image.imread(demo.directory / f"{name}.png")[..., :3]
     assert min(picture.shape[:2]) > 600
@@ -83,7 +85,15 @@ def test_summary_tells_measured_numbers(demo):
         "polypod info",
     ):
         assert text in demo.text
-    for name in ("report.html", "fig1.png", "fig3.png", "fig4.png", "solution.nc", "solution.csv"):
+    for name in (
+        "report.html",
+        "fig1.png",
+        "fig3.png",
+        "fig3-cut.png",
+        "fig4.png",
+        "solution.nc",
+        "solution.csv",
+    ):
         assert name in demo.text
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from polypod.mechanism import Mechanism
+from polypod.workspaces.cut import above
 from polypod.workspaces.length_lattice import LengthLattice, length_lattice
 from polypod.workspaces.search import workspace
 from polypod.workspaces.workspace import Workspace
@@ -36,10 +37,14 @@ class Section4:
     lattice: LengthLattice
     """The lattice of lengths [T41]."""
 
+    @property
+    def cut_at(self) -> float:
+        """Z of the cut, m."""
+        return float(self.flood.extents[2, 1]) - PRINTED[2]
+
     def facts(self) -> dict[str, Any]:
         """Sizes along X, Y, Z, m: printed, of both ways in full and cut, and how far the cuts are off."""
-        top = float(self.flood.extents[2, 1])
-        z = top - PRINTED[2]
+        top, z = float(self.flood.extents[2, 1]), self.cut_at
 
         def sizes(of: Workspace | LengthLattice, cut: Array) -> dict[str, Any]:
             return {
@@ -83,13 +88,7 @@ def section4(
 
 def widths_above(workspace: Workspace, z: float) -> Array:
     """(2,): extents along x and y of the part of a boundary above z, m; NaN where there is none."""
-    edges = workspace.faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
-    first, second = workspace.vertices[edges[:, 0]], workspace.vertices[edges[:, 1]]
-    crossing = (first[:, 2] > z) != (second[:, 2] > z)
-    first, second = first[crossing], second[crossing]
-    share = ((z - first[:, 2]) / (second[:, 2] - first[:, 2]))[:, None]
-    above = workspace.vertices[workspace.vertices[:, 2] > z]
-    points = np.concatenate([above, first + share * (second - first)])
+    points = above(workspace.vertices, workspace.faces, 2, z).vertices
     return np.ptp(points[:, :2], axis=0) if len(points) else np.full(2, np.nan)
 
 

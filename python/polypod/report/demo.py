@@ -61,6 +61,7 @@ def run_demo(directory: str | PathLike[str]) -> Demo:
     figures = {
         "fig1": plots.plot_fig1(mech, fig1_poses(mech), Figure(figsize=(10.0, 8.2))),
         "fig3": plots.plot_workspace(found.flood, Figure(figsize=(8.0, 7.4))),
+        "fig3-cut": plots.plot_workspace(found.flood, Figure(figsize=(8.0, 6.6)), above=found.cut_at),
         "fig4": plots.plot_fig4(solution, Figure(figsize=(10.0, 10.5))),
     }
     for name, figure in figures.items():
@@ -70,6 +71,7 @@ def run_demo(directory: str | PathLike[str]) -> Demo:
     first, third = table_i_markdown(mech), table_iii_markdown(mech, motion, EXAMPLE)
     text = _summary(facts, path, f"## Table I\n\n{first}")
     text += f"\n## Workspace of Section 4\n\n{section4_markdown(found, '`fig3.png`')}"
+    text += "`fig3-cut.png` shows the part that is cut at the printed height.\n"
     text += f"\n## Table III\n\n{third}"
     (directory / "summary.md").write_text(text, encoding="utf-8")
     section = section4_markdown(found, "The figure under [Workspace](#workspace)")
@@ -128,7 +130,8 @@ curves are in a figure without numbers; this motion is Polypod's.
 ## What to look at next
 
 - `report.html`: all of it as one page, with curves to zoom, actuators, reactions, singularities, workspace
-- `fig1.png`: Fig. 1; `fig3.png`: Fig. 3; `fig4.png`: the panels of Fig. 4; all as SVG, too
+- `fig1.png`: Fig. 1; `fig3.png`: Fig. 3 in full, `fig3-cut.png`: its part of the printed height;
+  `fig4.png`: the panels of Fig. 4; all as SVG, too
 - `solution.nc`, `solution.csv`: every quantity with its unit; `polypod.load_solution` reads both
 - `polypod info {facts["name"]}`: degrees of freedom, constraints, conditioning, warnings
 - `polypod solve {facts["name"]} your-motion.csv -o result.nc`: your own motion
