@@ -411,7 +411,9 @@ def save(figure: Figure, path: Path) -> None:
     """Writes a small PNG file: of 256 colours, without transparency."""
     with house_style():
         figure.savefig(buffer := io.BytesIO(), dpi=DOTS)
-    colors = Image.open(buffer).convert("RGB").quantize(dither=Image.Dither.NONE)
+    # The palette that covers all colours, then its means: rare ones, such as those of legends, stay themselves.
+    colors = Image.open(buffer).convert("RGB")
+    colors = colors.quantize(method=Image.Quantize.MAXCOVERAGE, kmeans=3, dither=Image.Dither.NONE)
     colors.save(path, optimize=True)
 
 
