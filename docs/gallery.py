@@ -21,7 +21,15 @@ from skimage.measure import marching_cubes
 import polypod as pp
 from polypod.bodies.palette import BLUE, GREY, INK, PALE, SKY, VERMILION, color_of
 from polypod.paper.fig1 import fig1_poses
-from polypod.plots import plot_fig1, plot_fig4, plot_mechanism, plot_poses, plot_topology, plot_workspace
+from polypod.plots import (
+    plot_fig1,
+    plot_fig2,
+    plot_fig4,
+    plot_mechanism,
+    plot_poses,
+    plot_topology,
+    plot_workspace,
+)
 from polypod.plots.style import dash_of, house_style
 
 Array = NDArray[np.float64]
@@ -81,6 +89,19 @@ def fig1() -> Figure:
 
 
 # --8<-- [end:fig1]
+
+
+@picture
+# --8<-- [start:fig2]
+def fig2() -> Figure:
+    mech = pp.load("lu-3spu-2rpu-r")
+    motion = pp.load_motion("lu-3spu-2rpu-r", mech).sample([4.8])
+    state = mech.state(motion.coordinates, motion.rates, motion.second_rates, branch=motion.branch)
+    figure = Figure(figsize=(10.2, 4.6))
+    return plot_fig2(mech, state.pose[0], state.twist[0], state.acceleration[0], figure)
+
+
+# --8<-- [end:fig2]
 
 
 @picture
@@ -411,7 +432,7 @@ def save(figure: Figure, path: Path) -> None:
     """Writes a small PNG file: of 256 colours, without transparency."""
     with house_style():
         figure.savefig(buffer := io.BytesIO(), dpi=DOTS)
-    # The palette that covers all colours, then its means: rare ones, such as those of legends, stay themselves.
+    # A palette that covers all colours: rare ones, such as those of legends, stay themselves.
     colors = Image.open(buffer).convert("RGB")
     colors = colors.quantize(method=Image.Quantize.MAXCOVERAGE, kmeans=3, dither=Image.Dither.NONE)
     colors.save(path, optimize=True)

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import itertools
-
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
-from mpl_toolkits.mplot3d.proj3d import proj_transform
 
 import polypod as pp
 from polypod.paper.fig1 import fig1_poses
 from polypod.plots import plot_fig1, plot_mechanism
 from polypod.plots.labels import Name, size_of_text, spread
+from support.pictures import overlaps
 
 NONE = np.zeros((0, 2, 2))
 
@@ -55,29 +53,6 @@ def test_a_name_leaves_a_line(ends):
     start, way = np.array(ends[0], float), np.subtract(ends[1], ends[0])
     inside = start + np.linspace(0.0, 1.0, 500)[:, None] * way - place
     assert not (np.abs(inside) < np.array(size_of_text("$L$", 8.0)) / 2).all(axis=1).any()
-
-
-def box(text):
-    """Of a drawn text, pixels: least x, least y, greatest x, greatest y."""
-    extent = text.get_window_extent()
-    if not hasattr(text, "get_position_3d"):
-        return np.array(extent.extents)
-    x, y, _ = proj_transform(*text.get_position_3d(), text.axes.get_proj())
-    middle, half = text.axes.transData.transform((x, y)), np.array([extent.width, extent.height]) / 2
-    return np.concatenate([middle - half, middle + half])
-
-
-def overlaps(figure):
-    """Pairs of texts of a figure whose boxes, with room above and below, share a fifth of the smaller."""
-    figure.canvas.draw()
-    texts = [*figure.texts, *(text for ax in figure.axes for text in ax.texts)]
-    found = []
-    for (first, a), (second, b) in itertools.combinations([(t.get_text(), box(t)) for t in texts], 2):
-        sides = np.minimum(a[2:], b[2:]) - np.maximum(a[:2], b[:2])
-        least = min(np.prod(a[2:] - a[:2]), np.prod(b[2:] - b[:2]))
-        if (sides > 0).all() and np.prod(sides) > 0.2 * least:
-            found.append((first, second))
-    return found
 
 
 def test_no_names_overlap_in_fig1():

@@ -25,6 +25,8 @@ def test_all_files_are_there(demo):
         *(
             "fig1.png",
             "fig1.svg",
+            "fig2.png",
+            "fig2.svg",
             "fig3.png",
             "fig3.svg",
             "fig3-cut.png",
@@ -36,7 +38,7 @@ def test_all_files_are_there(demo):
     }
 
 
-@pytest.mark.parametrize("name", ["fig1", "fig3", "fig3-cut", "fig4"])
+@pytest.mark.parametrize("name", ["fig1", "fig2", "fig3", "fig3-cut", "fig4"])
 def test_figures_show_something(demo, name):
     picture = matplotlib.image.imread(demo.directory / f"{name}.png")[..., :3]
     assert min(picture.shape[:2]) > 600
@@ -88,6 +90,7 @@ def test_summary_tells_measured_numbers(demo):
     for name in (
         "report.html",
         "fig1.png",
+        "fig2.png",
         "fig3.png",
         "fig3-cut.png",
         "fig4.png",

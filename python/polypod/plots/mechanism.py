@@ -14,8 +14,9 @@ from numpy.typing import ArrayLike, NDArray
 from polypod.errors import PolypodError, ShapeError
 from polypod.mechanism import Mechanism
 from polypod.plots.canvas import Canvas, Rect, cells, pyplot_figure
-from polypod.plots.scene import Scene, draw, frame, joint_handles
+from polypod.plots.scene import Scene, joint_handles
 from polypod.plots.style import house_style
+from polypod.plots.view import draw, frame
 
 Array = NDArray[np.float64]
 

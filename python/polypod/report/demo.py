@@ -10,7 +10,8 @@ from typing import Any
 from matplotlib.figure import Figure
 
 from polypod import plots
-from polypod.mechanism import load
+from polypod.mechanism import Mechanism, load
+from polypod.motion.motion import Motion
 from polypod.motion.motion_file import load_motion
 from polypod.paper.fig1 import fig1_poses
 from polypod.paper.section4 import section4
@@ -24,6 +25,10 @@ from polypod.summary.solution_facts import summarise
 
 EXAMPLE = MECHANISM
 """Built-in mechanism, and the motion of the same name."""
+
+
+FIG2_TIME = 4.8
+"""Of the instant of the motion that Fig. 2 shows, s."""
 
 
 @dataclass(frozen=True)
@@ -60,6 +65,7 @@ def run_demo(directory: str | PathLike[str]) -> Demo:
     found = section4(mech)
     figures = {
         "fig1": plots.plot_fig1(mech, fig1_poses(mech), Figure(figsize=(10.0, 8.2))),
+        "fig2": _fig2(mech, motion),
         "fig3": plots.plot_workspace(found.flood, Figure(figsize=(8.0, 7.4))),
         "fig3-cut": plots.plot_workspace(found.flood, Figure(figsize=(8.0, 6.6)), above=found.cut_at),
         "fig4": plots.plot_fig4(solution, Figure(figsize=(10.0, 10.5))),
@@ -79,6 +85,15 @@ def run_demo(directory: str | PathLike[str]) -> Demo:
     content = gather(mech, EXAMPLE, workspace=found.flood, paper=paper)
     save(render(content, "polypod demo"), directory / "report.html")
     return Demo(directory, (*files, "report.html", "summary.md"), facts, path, text)
+
+
+def _fig2(mech: Mechanism, motion: Motion) -> Figure:
+    """Vectors and axes of the legs and the rod at one instant of the motion."""
+    at = motion.sample([FIG2_TIME])
+    state = mech.state(at.coordinates, at.rates, at.second_rates, branch=at.branch)
+    figure = Figure(figsize=(10.2, 4.6))
+    plots.plot_fig2(mech, state.pose[0], state.twist[0], state.acceleration[0], figure)
+    return figure
 
 
 def _summary(facts: dict[str, Any], path: dict[str, Any], orientations: str) -> str:
@@ -130,8 +145,8 @@ curves are in a figure without numbers; this motion is Polypod's.
 ## What to look at next
 
 - `report.html`: all of it as one page, with curves to zoom, actuators, reactions, singularities, workspace
-- `fig1.png`: Fig. 1; `fig3.png`: Fig. 3 in full, `fig3-cut.png`: its part of the printed height;
-  `fig4.png`: the panels of Fig. 4; all as SVG, too
+- `fig1.png`: Fig. 1; `fig2.png`: Fig. 2 at {FIG2_TIME:g} s of the motion; `fig3.png`: Fig. 3 in full,
+  `fig3-cut.png`: its part of the printed height; `fig4.png`: the panels of Fig. 4; all as SVG, too
 - `solution.nc`, `solution.csv`: every quantity with its unit; `polypod.load_solution` reads both
 - `polypod info {facts["name"]}`: degrees of freedom, constraints, conditioning, warnings
 - `polypod solve {facts["name"]} your-motion.csv -o result.nc`: your own motion
