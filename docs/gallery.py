@@ -20,7 +20,16 @@ from skimage.measure import marching_cubes
 
 import polypod as pp
 from polypod.bodies.palette import BLUE, GREY, INK, PALE, SKY, VERMILION, color_of
-from polypod.plots import plot_fig4, plot_mechanism, plot_poses, plot_topology, plot_workspace
+from polypod.paper.fig1 import fig1_poses
+from polypod.plots import (
+    plot_fig1,
+    plot_fig2,
+    plot_fig4,
+    plot_mechanism,
+    plot_poses,
+    plot_topology,
+    plot_workspace,
+)
 from polypod.plots.style import dash_of, house_style
 
 Array = NDArray[np.float64]
@@ -70,6 +79,29 @@ def published() -> Figure:
 
 
 # --8<-- [end:published]
+
+
+@picture
+# --8<-- [start:fig1]
+def fig1() -> Figure:
+    mech = pp.load("lu-3spu-2rpu-r")
+    return plot_fig1(mech, fig1_poses(mech), Figure(figsize=(10.0, 8.2)))
+
+
+# --8<-- [end:fig1]
+
+
+@picture
+# --8<-- [start:fig2]
+def fig2() -> Figure:
+    mech = pp.load("lu-3spu-2rpu-r")
+    motion = pp.load_motion("lu-3spu-2rpu-r", mech).sample([4.8])
+    state = mech.state(motion.coordinates, motion.rates, motion.second_rates, branch=motion.branch)
+    figure = Figure(figsize=(10.2, 4.6))
+    return plot_fig2(mech, state.pose[0], state.twist[0], state.acceleration[0], figure)
+
+
+# --8<-- [end:fig2]
 
 
 @picture
@@ -208,6 +240,17 @@ def workspace() -> Figure:
 
 
 # --8<-- [end:workspace]
+
+
+@picture
+# --8<-- [start:fig3-cut]
+def fig3_cut() -> Figure:
+    found = pp.workspace(pp.load("lu-3spu-2rpu-r"), step=0.02)
+    highest = found.extents[2, 1]
+    return plot_workspace(found, Figure(figsize=(8.0, 6.6)), above=highest - 0.511)  # m, as printed
+
+
+# --8<-- [end:fig3-cut]
 
 
 @picture
@@ -386,10 +429,13 @@ def sweep() -> Figure:
 
 
 def save(figure: Figure, path: Path) -> None:
-    """Writes a small PNG file, without transparency."""
+    """Writes a small PNG file: of 256 colours, without transparency."""
     with house_style():
         figure.savefig(buffer := io.BytesIO(), dpi=DOTS)
-    Image.open(buffer).convert("RGB").save(path, optimize=True)
+    # A palette that covers all colours: rare ones, such as those of legends, stay themselves.
+    colors = Image.open(buffer).convert("RGB")
+    colors = colors.quantize(method=Image.Quantize.MAXCOVERAGE, kmeans=3, dither=Image.Dither.NONE)
+    colors.save(path, optimize=True)
 
 
 def main() -> None:

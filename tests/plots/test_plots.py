@@ -16,8 +16,9 @@ from matplotlib.figure import Figure
 import polypod as pp
 from polypod import plots
 from polypod.bodies.palette import PALETTE
-from polypod.errors import PolypodError, ShapeError
+from polypod.errors import PolypodError, ShapeError, WorkspaceError
 from polypod.plots.scene import Scene
+from polypod.workspaces.cut import above
 from support import DATA
 
 NAME = "lu-3spu-2rpu-r"
@@ -280,6 +281,43 @@ def test_four_views_of_a_workspace_and_an_outline(tmp_path):
     assert flat.axes[0].get_ylim()[1] == pytest.approx(55.7, abs=5.0)
     for i, figure in enumerate((solid, flat)):
         plots.save_figure(figure, tmp_path / f"{i}.svg")
+
+
+def test_the_part_of_a_workspace_above_a_height(tmp_path):
+    found = pp.workspace(pp.load("lu-3spu-2rpu-r"), step=0.06)
+    z = float(found.vertices[:, 2].max()) - 0.511
+    figure = plots.plot_workspace(found, Figure(figsize=(8.0, 6.6)), above=z)
+    whole = plots.plot_workspace(found, Figure(figsize=(8.0, 7.4)))
+    plots.save_figure(figure, tmp_path / "cut.svg")
+
+    def drawn(figure, view):
+        """All corners of the faces in a view, mm."""
+        [faces] = figure.axes[["top", "side", "front"].index(view)].collections
+        return np.concatenate([path.vertices for path in faces.get_paths()])
+
+    for view, axis in (("side", 1), ("front", 0)):
+        across, up = drawn(figure, view).T
+        assert up.min() == pytest.approx(1e3 * z, abs=1e-9)
+        assert np.ptp(up) == pytest.approx(511.0, abs=1e-9)
+        # As wide as the mesh above the height; the lower edge is straight from end to end.
+        assert np.ptp(across) == pytest.approx(
+            1e3 * np.ptp(above(found.vertices, found.faces, 2, z).vertices[:, axis]), abs=1e-9
+        )
+        edge = across[up < up.min() + 1e-6]
+        assert np.ptp(edge) > 0.95 * np.ptp(across)
+        assert drawn(whole, view)[:, 1].min() < 1.0
+    legend = {text.get_text() for text in figure.legends[0].get_texts()}
+    assert legend < {text.get_text() for text in whole.legends[0].get_texts()}
+    assert "edge of grid" not in legend
+
+
+def test_a_part_that_is_not_there_is_told():
+    mech = pp.load("lu-3spu-2rpu-r")
+    with pytest.raises(WorkspaceError, match=r"above is 0\.9; the greatest z .* is 0\.8"):
+        plots.plot_workspace(pp.workspace(mech, step=0.12), Figure(), above=0.9)
+    flat = pp.workspace(mech, ["azimuth", "tilt"], {"x": 0.0, "y": 0.1, "z": 0.7}, step=0.2)
+    with pytest.raises(WorkspaceError, match="two coordinates"):
+        plots.plot_workspace(flat, Figure(), above=0.1)
 
 
 # --- parts of figures ---------------------------------------------------------------------------------------

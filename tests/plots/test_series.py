@@ -77,6 +77,8 @@ def test_every_plot_takes_axes_or_a_figure_and_returns_it(mech, solution, reach)
         "plot_series": lambda on: plots.plot_series(solution, "force", on),
         "plot_workspace_view": lambda on: plots.plot_workspace_view(reach, on),
         "plot_poses": lambda on: plots.plot_poses(mech, [mech.home], on),
+        "plot_fig1": lambda on: plots.plot_fig1(mech, {"home": mech.home}, on),
+        "plot_fig2": lambda on: plots.plot_fig2(mech, mech.home, figure=on),
         "plot_fig4": lambda on: plots.plot_fig4(solution, on),
         "plot_workspace": lambda on: plots.plot_workspace(reach, on),
     }

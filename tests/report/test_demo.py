@@ -23,20 +23,22 @@ def test_all_files_are_there(demo):
     assert {path.name for path in demo.directory.iterdir()} == set(demo.files)
     assert set(demo.files) == {
         *(
+            "fig1.png",
+            "fig1.svg",
+            "fig2.png",
+            "fig2.svg",
             "fig3.png",
             "fig3.svg",
+            "fig3-cut.png",
+            "fig3-cut.svg",
             "fig4.png",
             "fig4.svg",
-            "poses.png",
-            "poses.svg",
-            "topology.png",
-            "topology.svg",
         ),
         *("solution.nc", "solution.csv", "summary.md", "report.html"),
     }
 
 
-@pytest.mark.parametrize("name", ["fig3", "fig4", "poses", "topology"])
+@pytest.mark.parametrize("name", ["fig1", "fig2", "fig3", "fig3-cut", "fig4"])
 def test_figures_show_something(demo, name):
     picture = matplotlib.image.imread(demo.directory / f"{name}.png")[..., :3]
     assert min(picture.shape[:2]) > 600
@@ -94,7 +96,16 @@ def test_summary_tells_measured_numbers(demo):
         "polypod info",
     ):
         assert text in demo.text
-    for name in ("report.html", "fig4.png", "poses.png", "topology.png", "solution.nc", "solution.csv"):
+    for name in (
+        "report.html",
+        "fig1.png",
+        "fig2.png",
+        "fig3.png",
+        "fig3-cut.png",
+        "fig4.png",
+        "solution.nc",
+        "solution.csv",
+    ):
         assert name in demo.text
 
 

@@ -37,10 +37,14 @@ class Section4:
     lattice: LengthLattice
     """The lattice of lengths [T41]."""
 
+    @property
+    def cut_at(self) -> float:
+        """Z of the cut, m."""
+        return float(self.flood.extents[2, 1]) - PRINTED[2]
+
     def facts(self) -> dict[str, Any]:
         """Sizes along X, Y, Z, m: printed, of both ways in full and cut, and how far the cuts are off."""
-        top = float(self.flood.extents[2, 1])
-        z = top - PRINTED[2]
+        top, z = float(self.flood.extents[2, 1]), self.cut_at
 
         def sizes(of: Workspace | LengthLattice, cut: Array) -> dict[str, Any]:
             return {

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import itertools
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -13,9 +13,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from polypod.errors import PolypodError, ShapeError
 from polypod.mechanism import Mechanism
-from polypod.plots.canvas import Canvas, cells, pyplot_figure
-from polypod.plots.scene import Scene, draw, frame, joint_handles
+from polypod.plots.canvas import Canvas, Rect, cells, pyplot_figure
+from polypod.plots.scene import Scene, joint_handles
 from polypod.plots.style import house_style
+from polypod.plots.view import draw, frame
 
 Array = NDArray[np.float64]
 
@@ -34,7 +35,7 @@ def plot_mechanism(
         ax: axes with `projection="3d"`.
         labels: names of joints and frames, and the legend of joints.
     """
-    place = _checked_pose(mech.home if pose is None else pose)
+    place = checked_pose(mech.home if pose is None else pose)
     with house_style():
         if ax is None:
             ax = pyplot_figure((5.2, 5.6)).add_subplot(projection="3d")
@@ -44,7 +45,7 @@ def plot_mechanism(
         half = np.ptp(scene.corners(), axis=0) / 2
         draw(ax, scene, half, frame(ax, scene.corners(), half), labels)
         if labels:
-            handles = joint_handles(scene.kinds)
+            handles = joint_handles(mech)
             ax.legend(handles=handles, loc="upper left", title="Joints", alignment="left")
     return ax
 
@@ -75,22 +76,38 @@ def plot_poses(
     rows = -(-len(places) // columns)
     with house_style():
         figure = figure or pyplot_figure((3.2 * columns, 3.5 * rows))
-        scenes = [Scene(mech, _checked_pose(pose)) for pose in places]
-        half = np.max([np.ptp(scene.corners(), axis=0) / 2 for scene in scenes], axis=0)
         grid = cells(
             figure, rows, columns, left=0.0, right=1.0, bottom=0.11, top=1.0, wspace=0.0, hspace=0.12
         )
-        rects = [*itertools.chain(*grid)][: len(scenes)]
-        spaces = [figure.add_axes(rect, projection="3d") for rect in rects]
-        views = list(zip(spaces, scenes, captions, strict=True))
-        zoom = min(frame(ax, scene.corners(), half) for ax, scene, _ in views)
-        for i, (ax, scene, caption) in enumerate(views):
-            draw(ax, scene, half, zoom, labels=i == 0)
-            cell = ax.get_position(original=True)
-            text = f"({chr(97 + i)})  {caption}".rstrip()
-            figure.text(cell.x0 + cell.width / 2, cell.y0, text, ha="center", va="top")
-        figure.legend(handles=joint_handles(scenes[0].kinds), loc="lower center", ncols=4)
+        rects = [*itertools.chain(*grid)][: len(places)]
+        side_by_side(mech, [checked_pose(pose) for pose in places], rects, captions, figure)
+        figure.legend(handles=joint_handles(mech), loc="lower center", ncols=4)
     return figure
+
+
+def side_by_side(
+    mech: Mechanism,
+    poses: Sequence[Array],
+    rects: Sequence[Rect],
+    captions: Sequence[str],
+    figure: Canvas,
+    *,
+    letters: str = "",
+) -> None:
+    """Draws the mechanism at poses (4, 4) into cells of a figure, at one scale, with a caption below each.
+
+    With `letters`, one for each, all have names of joints and axes; without, they are a, b, c … and the first
+    alone has names.
+    """
+    scenes = [Scene(mech, pose) for pose in poses]
+    half = np.max([np.ptp(scene.corners(), axis=0) / 2 for scene in scenes], axis=0)
+    spaces = [figure.add_axes(rect, projection="3d") for rect in rects]
+    zoom = min(frame(ax, scene.corners(), half) for ax, scene in zip(spaces, scenes, strict=True))
+    for i, (ax, scene, caption) in enumerate(zip(spaces, scenes, captions, strict=True)):
+        draw(ax, scene, half, zoom, labels=bool(letters) or i == 0)
+        cell = ax.get_position(original=True)
+        text = f"({letters[i] if letters else chr(97 + i)})  {caption}".rstrip()
+        figure.text(cell.x0 + cell.width / 2, cell.y0, text, ha="center", va="top")
 
 
 def small_picture(mech: Mechanism) -> bytes:
@@ -102,7 +119,8 @@ def small_picture(mech: Mechanism) -> bytes:
     return file.getvalue()
 
 
-def _checked_pose(pose: ArrayLike) -> Array:
+def checked_pose(pose: ArrayLike) -> Array:
+    """One pose (4, 4) of finite numbers; raises ShapeError for anything else."""
     array = np.asarray(pose, dtype=np.float64)
     if array.shape != (4, 4):
         raise ShapeError(f"pose has the shape {array.shape}; a drawing needs one pose, (4, 4)")

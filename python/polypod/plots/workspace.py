@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from collections.abc import Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -18,6 +19,7 @@ from polypod.bodies.palette import INK, PALE
 from polypod.errors import UnknownNameError, WorkspaceError
 from polypod.plots.canvas import Canvas, cells, pyplot_figure, size_of
 from polypod.plots.style import house_style
+from polypod.workspaces.cut import above as part_above
 from polypod.workspaces.workspace import Workspace
 
 Array = NDArray[np.float64]
@@ -49,7 +51,20 @@ VIEWS = {"top": (0, 1), "side": (1, 2), "front": (0, 2)}
 _ELEVATION, _AZIMUTH = math.radians(24.0), math.radians(-60.0)
 
 
-def plot_workspace(workspace: Workspace, figure: Canvas | None = None) -> Canvas:
+class _Surface(NamedTuple):
+    """Faces as they are drawn."""
+
+    points: Array
+    """(v, 3): vertices in mm, degrees or 1."""
+    faces: NDArray[np.int64]
+    """(f, 3): vertices of each triangle."""
+    labels: NDArray[np.int64]
+    """(f,): what ends the workspace at each."""
+
+
+def plot_workspace(
+    workspace: Workspace, figure: Canvas | None = None, *, above: float | None = None
+) -> Canvas:
     """Top, side, front and isometric view of a workspace, as in Fig. 3; of two coordinates the outline.
 
     The colour tells what ends the workspace: a limit of a leg has the colour of the leg, paler for the least
@@ -58,13 +73,19 @@ def plot_workspace(workspace: Workspace, figure: Canvas | None = None) -> Canvas
     Args:
         workspace: what to draw.
         figure: a figure or a subfigure to draw on.
+        above: draw only what has a third coordinate of at least this, m or rad.
+
+    Raises WorkspaceError where `above` leaves nothing, and for `above` with two coordinates.
     """
+    space = len(workspace.names) == 3
+    if above is not None and not space:
+        raise WorkspaceError(f"above is {above!r}; a workspace of two coordinates is drawn as a whole")
     with house_style():
-        figure = figure or pyplot_figure((8.0, 7.4) if len(workspace.names) == 3 else (5.6, 5.2))
-        if len(workspace.names) == 3:
-            _draw_views(workspace, figure)
+        figure = figure or pyplot_figure((8.0, 7.4) if space else (5.6, 5.2))
+        if space:
+            _draw_views(workspace, figure, _surface(workspace, above))
         else:
-            low = (0.75 + 0.17 * _legend(workspace, figure)) / size_of(figure)[1]
+            low = (0.75 + 0.17 * _legend(workspace, workspace.labels, figure)) / size_of(figure)[1]
             [[cell]] = cells(figure, 1, 1, left=0.13, right=0.97, bottom=low, top=0.97)
             _draw_outline(figure.add_axes(cell), workspace)
     return figure
@@ -95,28 +116,44 @@ def plot_workspace_view(
         if ax is None:
             ax = pyplot_figure((5.6, 4.0), layout="constrained").add_subplot()
         if space:
-            _draw_view(ax, workspace, view)
+            _draw_view(ax, workspace, _surface(workspace), view)
         else:
             _draw_outline(ax, workspace)
         if legend:
-            ax.legend(handles=_handles(workspace), loc="upper left", bbox_to_anchor=(1.02, 1.0))
+            ax.legend(
+                handles=_handles(workspace, workspace.labels), loc="upper left", bbox_to_anchor=(1.02, 1.0)
+            )
     return ax
 
 
-def _scaled(workspace: Workspace) -> tuple[Array, list[str]]:
-    """Vertices as they are drawn, and the labels of their axes."""
+def _surface(workspace: Workspace, above: float | None = None) -> _Surface:
+    """All faces of a workspace, or those from a value of the third coordinate on."""
+    labels = face_labels(workspace)
+    if above is None:
+        return _Surface(workspace.vertices * _factors(workspace), workspace.faces, labels)
+    part = part_above(workspace.vertices, workspace.faces, 2, above)
+    if not len(part.faces):
+        highest, name = float(workspace.extents[2, 1]), workspace.names[2]
+        raise WorkspaceError(f"above is {above:g}; the greatest {name} of the workspace is {highest:g}")
+    return _Surface(part.vertices * _factors(workspace), part.faces, labels[part.parent])
+
+
+def _factors(workspace: Workspace) -> list[float]:
+    """From coordinates to what axes show."""
+    return [_SCALES[unit][0] for unit in workspace.units]
+
+
+def _axis_labels(workspace: Workspace) -> list[str]:
     scales = [_SCALES[u] for u in workspace.units]
-    texts = [
+    return [
         f"{_SYMBOLS.get(name, name)} / {u}" if u else name
         for name, (_, u) in zip(workspace.names, scales, strict=True)
     ]
-    return workspace.vertices * [factor for factor, _ in scales], texts
 
 
-def _draw_views(workspace: Workspace, figure: Canvas) -> None:
-    points, _ = _scaled(workspace)
-    low = (0.75 + 0.17 * _legend(workspace, figure)) / size_of(figure)[1]
-    spans = np.ptp(points, axis=0) if _in_one_unit(workspace) else np.ones(3)
+def _draw_views(workspace: Workspace, figure: Canvas, surface: _Surface) -> None:
+    low = (0.75 + 0.17 * _legend(workspace, surface.labels, figure)) / size_of(figure)[1]
+    spans = np.ptp(surface.points, axis=0) if _in_one_unit(workspace) else np.ones(3)
     (top, isometric), (front, side) = cells(
         figure,
         2,
@@ -134,7 +171,7 @@ def _draw_views(workspace: Workspace, figure: Canvas) -> None:
     places = {"top": top, "side": side, "front": front, "isometric": isometric}
     for letter, (view, cell) in zip("abcd", places.items(), strict=True):
         ax = figure.add_axes(cell)
-        _draw_view(ax, workspace, view)
+        _draw_view(ax, workspace, surface, view)
         ax.set_title(f"({letter})  {view} view")
 
 
@@ -142,13 +179,13 @@ def _in_one_unit(workspace: Workspace) -> bool:
     return len({*workspace.units}) == 1
 
 
-def _draw_view(ax: Axes, workspace: Workspace, view: str) -> None:
+def _draw_view(ax: Axes, workspace: Workspace, surface: _Surface, view: str) -> None:
     """One view of a boundary in space, along an axis with scales or isometric with a triad."""
-    points, texts = _scaled(workspace)
+    points, texts = surface.points, _axis_labels(workspace)
     if view == "isometric":
         even = points if _in_one_unit(workspace) else points / np.ptp(points, axis=0)
         right, up = _isometric()
-        _draw_faces(ax, workspace, even, right, up)
+        _draw_faces(ax, surface._replace(points=even), workspace.colors, right, up)
         _draw_triad(ax, even, right, up, [_SYMBOLS.get(name, name) for name in workspace.names])
         ax.set_aspect("equal", adjustable="datalim")
         ax.margins(0.06)
@@ -156,7 +193,7 @@ def _draw_view(ax: Axes, workspace: Workspace, view: str) -> None:
     else:
         across, along = VIEWS[view]
         axes = np.eye(3)
-        _draw_faces(ax, workspace, points, axes[across], axes[along])
+        _draw_faces(ax, surface, workspace.colors, axes[across], axes[along])
         ax.set(xlabel=texts[across], ylabel=texts[along])
         ax.margins(0.04)
         if _in_one_unit(workspace):
@@ -170,19 +207,18 @@ def _isometric() -> tuple[Array, Array]:
     return np.array([-sa, ca, 0.0]), np.array([-se * ca, -se * sa, ce])
 
 
-def _draw_faces(ax: Axes, workspace: Workspace, points: Array, right: Array, up: Array) -> None:
+def _draw_faces(ax: Axes, surface: _Surface, palette: Sequence[str], right: Array, up: Array) -> None:
     """All faces, those behind first: where the mesh has small folds, those that look away close the gaps."""
-    corners = points[workspace.faces]
+    corners = surface.points[surface.faces]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     viewer = np.cross(right, up)
     seen = np.linalg.norm(normals, axis=1) > 0.0
-    smooth = _smoothed(workspace, normals)[seen]
+    smooth = _smoothed(surface, normals)[seen]
     corners = corners[seen]
     order = np.argsort(corners.mean(axis=1) @ viewer, kind="stable")
     light = np.clip(smooth @ (_LIGHT / np.linalg.norm(_LIGHT)), 0.0, 1.0)
-    palette = np.array([to_rgb(color) for color in workspace.colors])
     brightness = _DARKEST + (1.0 - _DARKEST) * light[:, None]
-    colors = (palette[face_labels(workspace)[seen]] * brightness)[order]
+    colors = (np.array([to_rgb(color) for color in palette])[surface.labels[seen]] * brightness)[order]
     flat = (corners @ np.stack([right, up], axis=1))[order]
     # Edges of the same colour close the seams; as a picture inside the SVG the many faces stay small.
     ax.add_collection(
@@ -192,12 +228,12 @@ def _draw_faces(ax: Axes, workspace: Workspace, points: Array, right: Array, up:
     )
 
 
-def _smoothed(workspace: Workspace, normals: Array) -> Array:
+def _smoothed(surface: _Surface, normals: Array) -> Array:
     """(f, 3): unit normals of the faces, averaged over the faces around their vertices."""
-    at_vertices = np.zeros((len(workspace.vertices), 3))
+    at_vertices = np.zeros((len(surface.points), 3))
     for k in range(3):
-        np.add.at(at_vertices, workspace.faces[:, k], normals)
-    mixed = at_vertices[workspace.faces].sum(axis=1)
+        np.add.at(at_vertices, surface.faces[:, k], normals)
+    mixed = at_vertices[surface.faces].sum(axis=1)
     return np.asarray(mixed / np.maximum(np.linalg.norm(mixed, axis=1, keepdims=True), 1e-300))
 
 
@@ -223,7 +259,7 @@ def _draw_triad(ax: Axes, points: Array, right: Array, up: Array, names: list[st
 
 
 def _draw_outline(ax: Axes, workspace: Workspace) -> None:
-    points, texts = _scaled(workspace)
+    points, texts = workspace.vertices * _factors(workspace), _axis_labels(workspace)
     # Rings follow one another; a segment that does not lead to the next point closes its ring.
     closing = workspace.faces[:, 1] != workspace.faces[:, 0] + 1
     codes = np.full(len(points), Outline.LINETO, dtype=np.uint8)
@@ -242,19 +278,19 @@ def _draw_outline(ax: Axes, workspace: Workspace) -> None:
         ax.set_aspect("equal", adjustable="box")
 
 
-def _legend(workspace: Workspace, figure: Canvas) -> int:
-    """Draws the causes of the boundary below the picture in rows; returns the number of rows."""
-    handles = _handles(workspace)
+def _legend(workspace: Workspace, labels: NDArray[np.int64], figure: Canvas) -> int:
+    """Draws the causes of what is drawn below the picture in rows; returns the number of rows."""
+    handles = _handles(workspace, labels)
     columns = min(len(handles), max(int(size_of(figure)[0] / 1.55), 1))
     by_column = [handle for column in range(columns) for handle in handles[column::columns]]
     figure.legend(handles=by_column, loc="lower center", ncols=columns, bbox_to_anchor=(0.5, 0.008))
     return -(-len(handles) // columns)
 
 
-def _handles(workspace: Workspace) -> list[Line2D]:
-    """A swatch for everything that ends the workspace, limits of a kind together."""
+def _handles(workspace: Workspace, labels: NDArray[np.int64]) -> list[Line2D]:
+    """A swatch for each of the labels that occur, limits of a kind together."""
     kinds = [limit.kind for limit in workspace.mechanism.limit_list]
-    present = np.unique(workspace.labels).tolist()
+    present = np.unique(labels).tolist()
     present.sort(key=lambda i: (kinds.index(kinds[i]) if i < len(kinds) else len(kinds), i))
     return [
         Line2D([], [], color=workspace.colors[i], label=workspace.label_names[i], **_SWATCH) for i in present

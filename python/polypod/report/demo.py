@@ -7,13 +7,13 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from polypod import plots
-from polypod.mechanism import load
+from polypod.mechanism import Mechanism, load
+from polypod.motion.motion import Motion
 from polypod.motion.motion_file import load_motion
+from polypod.paper.fig1 import fig1_poses
 from polypod.paper.section4 import section4
 from polypod.paper.sentences.judgements import TURNED, Judged, judge
 from polypod.paper.table_i import MECHANISM
@@ -27,13 +27,16 @@ from polypod.paper.tables import (
 )
 from polypod.report.content import gather
 from polypod.report.page import render, save
-from polypod.solution.solution import Solution
 from polypod.solution.solve import solve
 from polypod.summary.mechanism_facts import describe
 from polypod.summary.solution_facts import summarise
 
 EXAMPLE = MECHANISM
 """Built-in mechanism, and the motion of the same name."""
+
+
+FIG2_TIME = 4.8
+"""Of the instant of the motion that Fig. 2 shows, s."""
 
 
 @dataclass(frozen=True)
@@ -67,26 +70,22 @@ def run_demo(directory: str | PathLike[str]) -> Demo:
     for name in ("solution.nc", "solution.csv"):
         solution.save(directory / name)
         files.append(name)
-    topology = Figure(figsize=(7.0, 4.4), layout="constrained")
-    plots.plot_topology(mech.mobility(), topology.add_subplot())
-    poses = {"centre pose": mech.home, **_notable_poses(solution)}
+    found = section4(mech)
     figures = {
+        "fig1": plots.plot_fig1(mech, fig1_poses(mech), Figure(figsize=(10.0, 8.2))),
+        "fig2": _fig2(mech, motion),
+        "fig3": plots.plot_workspace(found.flood, Figure(figsize=(8.0, 7.4))),
+        "fig3-cut": plots.plot_workspace(found.flood, Figure(figsize=(8.0, 6.6)), above=found.cut_at),
         "fig4": plots.plot_fig4(solution, Figure(figsize=(10.0, 10.5))),
-        "poses": plots.plot_poses(mech, poses, Figure(figsize=(12.8, 3.5))),
-        "topology": topology,
     }
     for name, figure in figures.items():
         for suffix in (".png", ".svg"):
             plots.save_figure(figure, directory / (name + suffix))
             files.append(name + suffix)
-    found = section4(mech)
-    views = plots.plot_workspace(found.flood, Figure(figsize=(8.0, 7.4)))
-    for suffix in (".png", ".svg"):
-        plots.save_figure(views, directory / f"fig3{suffix}")
-        files.append(f"fig3{suffix}")
     first, third = table_i_markdown(mech), table_iii_markdown(mech, motion, EXAMPLE)
     text = _summary(facts, path, f"## Table I\n\n{first}")
     text += f"\n## Workspace of Section 4\n\n{section4_markdown(found, '`fig3.png`')}"
+    text += "`fig3-cut.png` shows the part that is cut at the printed height.\n"
     judged = Judged(mech, load(TURNED), motion, found.flood)
     sentences = judge(judged)
     text += f"\n## Table III\n\n{third}\n## The paper's sentences\n\n{verdicts_markdown(sentences)}"
@@ -100,24 +99,13 @@ def run_demo(directory: str | PathLike[str]) -> Demo:
     return Demo(directory, (*files, "report.html", "summary.md"), facts, path, text)
 
 
-def _notable_poses(solution: Solution) -> dict[str, NDArray[np.float64]]:
-    """Two positions far from Z and a large tilt, as in Fig. 1c-e, of those that the motion passes."""
-    poses, time = solution.dataset["pose"].to_numpy(), solution.dataset["time"].to_numpy()
-    position, upright = poses[:, :3, 3], poses[:, 2, 2]
-    first = int(np.argmax(np.linalg.norm(position[:, :2], axis=-1)))
-    second = int(np.argmax(np.linalg.norm(position - position[first], axis=-1)))
-    other = np.min(np.abs(time[:, None] - time[[first, second]]), axis=1) > 0.2 * (time[-1] - time[0])
-    tilted = int(np.argmin(np.where(other, upright, np.inf)))
-    tilt = np.degrees(np.arccos(np.clip(upright[tilted], -1.0, 1.0)))
-
-    def far(i: int) -> str:
-        return f"{1e3 * np.linalg.norm(position[i, :2]):.0f} mm from $Z$, $t$ = {time[i]:g} s"
-
-    return {
-        far(first): poses[first],
-        far(second): poses[second],
-        f"tilt {tilt:.0f}°, $t$ = {time[tilted]:g} s": poses[tilted],
-    }
+def _fig2(mech: Mechanism, motion: Motion) -> Figure:
+    """Vectors and axes of the legs and the rod at one instant of the motion."""
+    at = motion.sample([FIG2_TIME])
+    state = mech.state(at.coordinates, at.rates, at.second_rates, branch=at.branch)
+    figure = Figure(figsize=(10.2, 4.6))
+    plots.plot_fig2(mech, state.pose[0], state.twist[0], state.acceleration[0], figure)
+    return figure
 
 
 def _summary(facts: dict[str, Any], path: dict[str, Any], orientations: str) -> str:
@@ -169,8 +157,8 @@ curves are in a figure without numbers; this motion is Polypod's.
 ## What to look at next
 
 - `report.html`: all of it as one page, with curves to zoom, actuators, reactions, singularities, workspace
-- `fig3.png`: Fig. 3; `fig4.png`: the panels of Fig. 4; `poses.png`: Fig. 1a, c-e; `topology.png`: Fig. 1b;
-  all as SVG, too
+- `fig1.png`: Fig. 1; `fig2.png`: Fig. 2 at {FIG2_TIME:g} s of the motion; `fig3.png`: Fig. 3 in full,
+  `fig3-cut.png`: its part of the printed height; `fig4.png`: the panels of Fig. 4; all as SVG, too
 - `solution.nc`, `solution.csv`: every quantity with its unit; `polypod.load_solution` reads both
 - `polypod info {facts["name"]}`: degrees of freedom, constraints, conditioning, warnings
 - `polypod solve {facts["name"]} your-motion.csv -o result.nc`: your own motion
