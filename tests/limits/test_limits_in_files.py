@@ -60,7 +60,7 @@ BAD: dict[str, tuple[Callable[[Tables], Any], str, str]] = {
     "negative clearance": (
         lambda t: (t.update(limits={"clearance": -1.0}), [leg.update(radius=10.0) for leg in t["legs"]]),
         "limits.clearance",
-        "is -0.001 m; must be zero or positive",
+        "is -1 mm; must be zero or positive",
     ),
     "clearance of a leg without radius": (
         lambda t: (t.update(limits={"clearance": 1.0}), [leg.update(radius=10.0) for leg in t["legs"][:4]]),
@@ -84,7 +84,7 @@ BAD: dict[str, tuple[Callable[[Tables], Any], str, str]] = {
             t["legs"][3].update(radius=15.0),
         ),
         "limits.joint_reach",
-        'must exceed radius and clearance of leg "4", together 0.016 m',
+        'must exceed radius and clearance of leg "4", together 16 mm',
     ),
     "unknown key": (
         lambda t: t.update(limits={"sigma": 0.1}),
